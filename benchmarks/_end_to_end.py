@@ -31,30 +31,31 @@ from gensig.systems import spur_pair
 
 # of the kernel's rate, where that would be the same
 RECORDING_SHARE = "share of the records' own integration"
-SHARD = 24  # records, as in the experiment
-N_SHARDS, SHARDS_A_WORKER = 2, 3
+SHARD = 32  # records, as in the experiment
+# of the plan; with a reference for every four of them, they fill the shards
+FIVE_SHARDS, TEN_SHARDS = 128, 256
 
 
-def data_set(precision: str, n_shards: int) -> dict[str, Any]:
+def data_set(precision: str, n_planned: int, *words: str) -> dict[str, Any]:
     """Configuration of a quickstart data set.
 
     1 s, four channels, a fault, speed, load and noise of its own each.
     """
     config, _ = quickstart(
-        n_shards * SHARD,
+        n_planned,
         f"solver.precision={precision}",
         f"dataset.records_per_shard={SHARD}",
+        *words,
     )
     return config
 
 
-def by_stage(precision: str, runs: int) -> dict[str, float]:
+def by_stage(precision: str, runs: int, *words: str) -> dict[str, float]:
     """CPU milliseconds of a record by stage and in all, and rates of one process.
 
-    The best of several runs.
+    The best of several runs; ``words`` are further options of the data set.
     """
-    config = data_set(precision, N_SHARDS)
-    n_records = N_SHARDS * SHARD
+    config = data_set(precision, FIVE_SHARDS, *words)
     n_samples = round(
         config["operating"]["duration_s"] * config["sensing"]["sampling_rate_hz"]
     )
@@ -66,7 +67,7 @@ def by_stage(precision: str, runs: int) -> dict[str, float]:
         spur_pair._mesh_table.cache_clear()
         sound_load.cache_clear()
         with tempfile.TemporaryDirectory() as folder:
-            begin_folder(config, [], Path(folder) / "set")
+            n_records = begin_folder(config, [], Path(folder) / "set").n_records
             stages, start = Stages(), time.perf_counter()
             with stages.watching(n_samples):
                 _complete(Path(folder) / "set", workers=1)
@@ -109,27 +110,28 @@ def wall_rates(precision: str, workers: int, runs: int) -> dict[str, float]:
 
     Once every worker has finished its first shard, and of the whole data set.
     """
-    n_shards = SHARDS_A_WORKER * workers
-    config, whole, running = data_set(precision, n_shards), [], []
+    config, whole, running = data_set(precision, TEN_SHARDS), [], []
     for _ in range(runs):
         with tempfile.TemporaryDirectory() as folder:
             begin_folder(config, [], Path(folder) / "set")
             start = time.perf_counter()
             ends = _complete(Path(folder) / "set", workers=workers)
-            whole.append(n_shards * SHARD / (time.perf_counter() - start))
-        running.append((n_shards - workers) * SHARD / (ends[-1] - ends[workers - 1]))
+        (first, n_before), (last, n_records) = ends[workers - 1], ends[-1]
+        whole.append(n_records / (last - start))
+        running.append((n_records - n_before) / (last - first))
     return {
         wall_name(workers): max(running),
         f"{wall_name(workers)}, with their start": max(whole),
     }
 
 
-def _complete(out: Path, *, workers: int) -> list[float]:
-    """Make every shard; the times at which they were finished."""
-    ends: list[float] = []
-    executor = LocalExecutor(n_workers=workers)
+def _complete(out: Path, *, workers: int) -> list[tuple[float, int]]:
+    """Make every shard; the times at which they were finished, and the records until then."""
+    ends: list[tuple[float, int]] = []
     n_failed, problems = run_folder(
-        out, executor=executor, on_shard=lambda _: ends.append(time.perf_counter())
+        out,
+        executor=LocalExecutor(n_workers=workers),
+        on_shard=lambda progress: ends.append((time.perf_counter(), progress.n_done)),
     )
     if n_failed or problems:
         raise AssertionError(f"{n_failed} records failed, problems: {problems}")

@@ -16,7 +16,8 @@ import numpy as np
 
 from benchmarks._measure import least
 from gensig.dataset.storage.shard import ShardWriter
-from gensig.dynamics import _kernels
+from gensig.dynamics import _record_kernels
+from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.backends import group_motions
 from gensig.dynamics.backends.group_run import GroupRun
 from gensig.dynamics.decimation import Decimator, decimator
@@ -168,17 +169,19 @@ def low_pass_seconds(
     """CPU seconds of the low-pass for one output sample of a whole group, block by block as in the
     product.
     """
-    low_pass, block = decimator(oversampling), _kernels.BLOCK
-    width = n_channels * _kernels.n_lanes(precision)
-    taps = low_pass.padded(precision)
-    means = np.zeros(
-        _kernels.mean_rows(len(taps), oversampling) * width, dtype=precision
-    )
-    out, again = np.empty(block * width, dtype=precision), 50
+    low_pass, block = decimator(oversampling), _record_kernels.BLOCK
+    kind = _record_kernels.LOW_PASS_PRECISION
+    taps, width = low_pass.padded(kind), n_lanes(kind)
+    n_rows = _record_kernels.step_rows(n_channels * n_lanes(precision), width)
+    n_steps = _record_kernels.narrow_steps(len(taps), oversampling)
+    means = np.zeros(n_steps * n_rows * width, dtype=kind)
+    out, again = np.empty(block * n_rows * width, dtype=kind), 50
 
     def work() -> None:
         for _ in range(again):
-            _kernels.low_pass(means, 0, taps, oversampling, n_channels, block, out, 0)
+            _record_kernels.low_pass(
+                means, 0, taps, oversampling, n_rows, block, out, 0
+            )
 
     work()
     return least(work, runs) / (again * block)

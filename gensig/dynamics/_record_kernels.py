@@ -19,6 +19,9 @@ from gensig.dynamics._vector import (
 
 BLOCK = 64  # output samples between two passes of the low-pass, whose input is still in the cache
 TOGETHER = 4  # samples of the low-pass that are summed side by side; divides BLOCK
+# The low-pass of float64 motions, too: rounding adds noise of some 1e-7 of the signal, white, and
+# the time is half.
+LOW_PASS_PRECISION = "float32"
 
 _overload: Any = overload
 
@@ -89,6 +92,7 @@ def record(
     angle,
     seen,
     means,
+    narrow,
     work,
     wide,
     near,
@@ -96,15 +100,17 @@ def record(
     """Integrate and decimate block by block, so that the internal rate stays in the cache.
 
     ``out`` (lane, channel, sample) float64 takes ``n_samples``; the first tap of the first sample
-    is at the step after ``first_step``. ``means`` is a scratch of ``mean_rows`` rows of channels,
-    of which the last ``BLOCK`` take samples.
+    is at the step after ``first_step``. ``means`` is a scratch for the steps of a block, and
+    ``narrow`` one of ``narrow_steps`` steps of ``step_rows`` rows, of which the last ``BLOCK`` take
+    samples.
     """
     n, n_channels = width(work), len(channels)
+    per_step, n_rows = n * n_channels, step_rows(n * n_channels, width(narrow))
     n_kept = len(taps) - (2 * TOGETHER - 1) * factor
     angle_row, now, done = 0, first_step, 0
     samples = n_kept + BLOCK * factor
     # one step, then the input of the first sample before its last steps, then block by block
-    n_steps, out_row = 1, -1
+    n_steps, out_row, first_row = 1, -1, 0
     while True:
         angle_row = integrate(
             group,
@@ -128,26 +134,49 @@ def record(
         now += n_steps
         for lane in range(n):
             fresh[lane] = 0.0
-        if out_row == n_kept:
+        if out_row == 0:
+            _narrowed(means, n_steps, per_step, narrow, first_row, n_rows)
+        if first_row == n_kept:
             n_block = n_steps // factor
-            low_pass(means, 0, taps, factor, n_channels, n_block, means, samples)
+            low_pass(narrow, 0, taps, factor, n_rows, n_block, narrow, samples)
             for lane in range(n):
                 for c in range(n_channels):
                     series = (lane * n_channels + c) * n_samples + done
                     for s in range(n_block):
-                        row = (samples + s) * n_channels + c
-                        out[series + s] = means[at(row, lane, n)]
-            for i in range(n_kept * n_channels):
-                set_row(means, i, get_row(means, n_steps * n_channels + i))
+                        sample = (samples + s) * n_rows * width(narrow)
+                        out[series + s] = narrow[sample + at(c, lane, n)]
+            for i in range(n_kept * n_rows):
+                set_row(narrow, i, get_row(narrow, n_steps * n_rows + i))
             done += n_block
         if done == n_samples:
             break
         if out_row < 0:
             n_steps, out_row = n_kept, 0
         else:
-            n_steps, out_row = min(BLOCK, n_samples - done) * factor, n_kept
+            n_steps, first_row = min(BLOCK, n_samples - done) * factor, n_kept
 
 
-def mean_rows(n_taps, factor):
-    """Rows of channels that ``record`` needs for its steps, for padded taps."""
+@compiled
+def _narrowed(means, n_steps, per_step, narrow, first_step, n_rows):
+    """Copy the numbers of steps to the rows of the low-pass, from a step of them on."""
+    per_narrow = n_rows * width(narrow)
+    for step in range(n_steps):
+        source, target = step * per_step, (first_step + step) * per_narrow
+        for i in range(per_step):
+            narrow[target + i] = means[source + i]
+
+
+@compiled
+def step_rows(n_numbers, n_lanes):
+    """Rows of the low-pass that take the channels of a step: two channels of float64 a row."""
+    return -(-n_numbers // n_lanes)
+
+
+def mean_steps(n_taps, factor):
+    """Steps that ``record`` integrates at a time, at most, for padded taps."""
+    return max(n_taps - (2 * TOGETHER - 1) * factor, BLOCK * factor)
+
+
+def narrow_steps(n_taps, factor):
+    """Steps and samples that ``record`` needs in the rows of its low-pass, for padded taps."""
     return n_taps - (2 * TOGETHER - 1) * factor + BLOCK * factor + BLOCK

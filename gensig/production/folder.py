@@ -46,7 +46,7 @@ from gensig.record.options import (
     read_dataset_options,
     read_plan_options,
 )
-from gensig.record.simulate import signal_shapes, simulate_records
+from gensig.record.simulate import finished_records, signal_shapes
 from gensig.systems.base import Machine
 from gensig.units import channel_unit
 from gensig.version import __version__
@@ -254,7 +254,7 @@ def write_shard(out: Path, shard_index: int) -> WrittenShard:
         for first in range(0, n_records, together):
             rows = plan.records(begin + first, min(together, n_records - first))
             _check_rows(out, rows, shard_index, first)
-            for row, record in enumerate(simulate_records(config, rows), start=first):
+            for row, record in enumerate(finished_records(config, rows), start=first):
                 writer.write(row, record.signals, record.values)
     written = WrittenShard(
         sha256=writer.sha256, n_bytes=writer.n_bytes, n_failed=writer.n_failed

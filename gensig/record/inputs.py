@@ -149,9 +149,7 @@ class RecordInputs:
     def clean(self, acceleration: Array) -> Array:
         """Output of the sensors before noise, their drift included, (sensor, sample) m/s2."""
         measured = self.instrument.measure(acceleration)
-        return measured * self.instrument.drift(
-            measured.shape[1], self.stream(Stream.DRIFT)
-        )
+        return self.instrument.drifted(measured, self.stream(Stream.DRIFT))
 
     def noisy(self, clean: Array, noise_power: Array) -> tuple[Array, dict[str, Any]]:
         """Noise, offset, converter and lost samples, and the columns on clipping and loss."""
@@ -177,7 +175,7 @@ class RecordInputs:
         their difference would be free of noise.
         """
         drift, noise, dropped = self.stream(Stream.HEALTHY_TWIN).spawn(3)
-        drifted = clean * self.instrument.drift(clean.shape[1], drift)
+        drifted = self.instrument.drifted(clean, drift)
         noisy, _ = self.instrument.record(drifted, noise_power, noise)
         return self.instrument.transmitted(noisy, dropped)[0]
 

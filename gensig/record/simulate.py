@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -55,6 +55,15 @@ def simulate_records(config: Configuration, rows: Sequence[Row]) -> list[Record]
     The bits of a record do not depend on the other rows. A motion that does not stay finite
     becomes a record marked as failed.
     """
+    return list(finished_records(config, rows))
+
+
+def finished_records(config: Configuration, rows: Sequence[Row]) -> Iterator[Record]:
+    """The records of ``simulate_records``, each measured when it is asked for.
+
+    All motions are simulated before the first, but the samples of one record only are in memory
+    where each is stored at once.
+    """
     reader = InputReader(config)
     inputs = [reader.inputs(row) for row in rows]
     keys = _twin_keys(config, rows)
@@ -67,19 +76,14 @@ def simulate_records(config: Configuration, rows: Sequence[Row]) -> list[Record]
     of_records = [next(motions) for _ in inputs]
     _keep_twins(keys, {key: (twin, next(motions)) for key, twin in twins.items()})
     of_sound = dict(zip(sound, motions, strict=True))
-    return [
-        _record(
-            config,
-            row,
-            _Measured(
-                inputs=inputs[index],
-                motion=of_records[index],
-                sound=of_sound.get(index, of_records[index]),
-                twin_power=_TWINS.get(keys[index]),
-            ),
+    for index, row in enumerate(rows):
+        measured = _Measured(
+            inputs=inputs[index],
+            motion=of_records[index],
+            sound=of_sound.get(index, of_records[index]),
+            twin_power=_TWINS.get(keys[index]),
         )
-        for index, row in enumerate(rows)
-    ]
+        yield _record(config, row, measured)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

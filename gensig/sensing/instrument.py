@@ -63,18 +63,17 @@ class Instrument:
             )
         return np.ascontiguousarray(signal[:, self.sensing.n_lead :])
 
-    def drift(self, n_samples: int, rng: np.random.Generator) -> Array:
-        """Factor of each sensor's gain over one record, (sensor, sample).
+    def drifted(self, signal: Array, rng: np.random.Generator) -> Array:
+        """Output of sensors whose gain drifts over one record, (sensor, sample) m/s2.
 
-        (1, 1) of 1 where none drifts.
+        The signal itself where none drifts.
         """
-        sensor, n_sensors = self.sensing.sensor, len(self.sensing.channel_names)
+        sensor, rate = self.sensing.sensor, self.sensing.sampling_rate
         if sensor is None or not sensor.drift_scatter:
-            return np.ones((1, 1))
-        rate = self.sensing.sampling_rate
-        return draw_drift(
-            rng, sensor.drift_scatter, sensor.drift_time, n_sensors, n_samples, rate
-        )
+            return signal
+        n_sensors, n_samples = signal.shape
+        scatter, lasting = sensor.drift_scatter, sensor.drift_time
+        return signal * draw_drift(rng, scatter, lasting, n_sensors, n_samples, rate)
 
     def power(self, signal: Array) -> Array:
         """Mean square without the mean in the band of the signal-to-noise ratio.

@@ -34,7 +34,7 @@ def checks(
     errors = np.full(len(exact), np.nan)
     if solver.max_error is None:
         return errors, ["none"] * len(exact)
-    signal = motions.acceleration[:, :, : exact.shape[2]]
+    signal = np.stack([rows[:, : exact.shape[2]] for rows in motions.acceleration])
     errors[finite] = in_band_error(signal[finite], exact[finite], sampling_rate)
     verdicts = np.where(errors <= solver.max_error, "error", "unresolved").tolist()
     bouncing = motions.contact_loss.max(axis=1) > BOUNCING

@@ -287,9 +287,9 @@ def _side_by_side(
         if not motions.finite[index]:
             records.append(not_finite(run, [machines[index]]))
             continue
-        acceleration, angle = motions.acceleration[index], motions.angle[index, 0]
+        acceleration, angle = motions.acceleration[index], motions.angle[index][0]
         if run.gearbox is not None:
-            acceleration = acceleration * run.gearbox.gain[:, None]
+            acceleration *= run.gearbox.gain[:, None]
         mesh = None
         if run.with_mesh_state:
             faulty = faulty_teeth(run.system.pair, run.faults)

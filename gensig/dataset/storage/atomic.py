@@ -73,14 +73,15 @@ def write_text(path: Path, text: str) -> None:
     write_bytes(path, text.encode("utf-8"))
 
 
-def write_bytes(path: Path, content: bytes) -> None:
+def write_bytes(path: Path, content: bytes | memoryview) -> None:
     """Write or replace a file atomically.
 
     DatasetError when the disk refuses, after which no part of it is left.
     """
     temporary = temporary_name(path)
     try:
-        temporary.write_bytes(content)
+        with temporary.open("wb") as file:
+            file.write(content)
         publish(temporary, path)
     except OSError as error:
         raise cannot_write(path, error) from error

@@ -4,7 +4,7 @@ HDF5 itself crashes the process when a disk is full.
 """
 
 import hashlib
-import itertools
+import io
 from pathlib import Path
 
 import h5py
@@ -13,28 +13,32 @@ from gensig.dataset.storage.atomic import write_bytes
 
 # The oldest file format h5py can write: MATLAB, Octave and old HDF5 tools read it.
 LIBRARY_VERSIONS = ("earliest", "v110")
-GROWTH = 4 * 1024**2
-
-_COUNTER = itertools.count()
 
 
-def memory_file() -> h5py.File:
-    """An empty HDF5 file that exists in memory only."""
-    # No file of this name is made; HDF5 wants distinct names for files that are open together.
-    name = f"gensig-memory-{next(_COUNTER)}"
-    return h5py.File(
-        name,
-        "w",
-        driver="core",
-        backing_store=False,
-        block_size=GROWTH,
-        libver=LIBRARY_VERSIONS,
-    )
+class _Content(io.BytesIO):
+    """Bytes that become longer, too, when their length is set, as those of a file do."""
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the length; new bytes are 0."""
+        end = self.seek(0, io.SEEK_END)
+        if size is None or size < end:
+            return super().truncate(size)
+        if size > end:  # else a view of the bytes may be in use
+            self.write(bytes(size - end))
+        return size
 
 
-def publish_image(file: h5py.File, path: Path) -> tuple[str, int]:
-    """Write a memory file atomically under its final name; returns sha256 and number of bytes."""
-    file.flush()
-    image = file.id.get_file_image()
-    write_bytes(path, image)
-    return hashlib.sha256(image).hexdigest(), len(image)
+class MemoryFile(h5py.File):  # type: ignore[misc]
+    """An empty HDF5 file that exists in memory only, and is written without a copy of it."""
+
+    def __init__(self) -> None:
+        content = _Content()
+        super().__init__(content, "w", libver=LIBRARY_VERSIONS)
+        self._content = content
+
+    def publish(self, path: Path) -> tuple[str, int]:
+        """Write it atomically under its final name; returns sha256 and number of bytes."""
+        self.flush()
+        with self._content.getbuffer() as image:
+            write_bytes(path, image)
+            return hashlib.sha256(image).hexdigest(), len(image)

@@ -16,7 +16,7 @@ from gensig.dataset.storage.attributes import (
     set_attribute,
 )
 from gensig.dataset.storage.guard import datasets, open_shard
-from gensig.dataset.storage.image import memory_file, publish_image
+from gensig.dataset.storage.image import MemoryFile
 
 
 def write_index(folder: Path, manifest: Manifest) -> str:
@@ -29,13 +29,13 @@ def write_index(folder: Path, manifest: Manifest) -> str:
     path = folder / INDEX
     with (
         open_shard(shard_path(folder, 0), folder=folder) as first,
-        memory_file() as index,
+        MemoryFile() as index,
     ):
         for name, value in read_attributes(first).items():
             set_attribute(index, name, value)
         for name, data in datasets(first, path).items():
             _map(index, name, data, manifest)
-        return publish_image(index, path)[0]
+        return index.publish(path)[0]
 
 
 def _map(index: h5py.File, name: str, data: h5py.Dataset, manifest: Manifest) -> None:

@@ -43,7 +43,7 @@ from gensig.dataset.storage.compression import (
     creation_options,
     fixed_settings,
 )
-from gensig.dataset.storage.image import memory_file, publish_image
+from gensig.dataset.storage.image import MemoryFile
 from gensig.dataset.storage.quantization import quantized
 from gensig.errors import DatasetError
 
@@ -99,8 +99,7 @@ class ShardWriter:
                     that is full
 
     The bytes depend neither on time, folder nor process; with `compression='none'` not on the
-    order of `write` either. The shard is built in memory, about twice its size at the end, and
-    then written in one go.
+    order of `write` either. The shard is built in memory and then written in one go.
     """
 
     def __init__(
@@ -158,10 +157,11 @@ class ShardWriter:
         for name, scale in self.scales.items():
             self._rows[scale] = np.zeros((n_records, self.signals[name][0]), "<f8")
         self._written = np.zeros(n_records, dtype=bool)
-        self._file: h5py.File | None = None
+        self._bulk: dict[str, h5py.Dataset] = {}
+        self._file: MemoryFile | None = None
 
     def __enter__(self) -> "ShardWriter":
-        self._file = memory_file()
+        self._file = MemoryFile()
         try:
             for name, value in self.attributes.items():
                 set_attribute(self._file, name, value)
@@ -221,7 +221,7 @@ class ShardWriter:
                 array, self._rows[self.scales[name]][row] = quantized(array)
             if signal_column(name).is_bulk:
                 with fixed_settings():
-                    self._file[name][row] = array
+                    self._bulk[name][row] = array
             else:
                 self._rows[name][row] = array
         for name, value in encoded.items():
@@ -261,20 +261,23 @@ class ShardWriter:
         if scale is not None:
             dtype, unit = np.dtype("<i2"), "1"
         properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        chunks: tuple[int, ...] | None = (1, *shape)
         if self.compression == "none":
-            # Space is laid out now, in row order, and not filled first: every row is written
-            # anyway.
+            # One piece without chunks takes a third of the time. Space is laid out now, in row
+            # order, and not filled first: every row is written anyway.
+            chunks = None
             properties.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
             properties.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
         data = self._file.create_dataset(
             name,
             shape=(self.n_records, *shape),
             dtype=dtype,
-            chunks=(1, *shape),
+            chunks=chunks,
             track_times=False,
             dcpl=properties,
             **self._options,
         )
+        self._bulk[name] = data
         set_attribute(data, "unit", unit)
         if scale is not None:
             set_attribute(data, "scale", scale)
@@ -307,7 +310,7 @@ class ShardWriter:
             set_attribute(data, "unit", unit_in_file(column, self.attributes))
         self.n_failed = int(np.count_nonzero(self._rows["status"] == b"failed"))
         with fixed_settings():  # HDF5 compresses what is in its cache now
-            self.sha256, self.n_bytes = publish_image(self._file, self.path)
+            self.sha256, self.n_bytes = self._file.publish(self.path)
 
     def _close(self) -> None:
         file, self._file = self._file, None

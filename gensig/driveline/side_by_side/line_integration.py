@@ -44,8 +44,11 @@ def integrate_lines(
     first = machines[0]
     core = line_core(len(first.pairs), len(first.angles))
     motions = integrate_machines(machines, integration, core)
-    rests = np.array([line.rest[list(line.angles)] for line in machines])
-    return replace(motions, angle=motions.angle + rests[:, :, None])
+    angles = [
+        angle + line.rest[list(line.angles), None]
+        for angle, line in zip(motions.angle, machines, strict=True)
+    ]
+    return replace(motions, angle=angles)
 
 
 def _scratch(

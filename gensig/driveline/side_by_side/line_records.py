@@ -153,7 +153,7 @@ def _together(
         records.append(
             CleanRecord(
                 acceleration=run.system.rows(run, line.running, signals),
-                shaft_angle=motions.angle[index, 0],
+                shaft_angle=motions.angle[index][0],
                 mean_speed=float(motions.mean_speed[index]),
                 contact_loss_fraction=float(motions.contact_loss[index, number]),
                 integration_error=float(errors[index]),
@@ -170,8 +170,8 @@ def _mesh_state(
 ) -> MeshState:
     """Loads of the teeth of mesh ``m`` in one of some motions."""
     machine, drive = run.system, run.system.engine.drive
-    seen = motions.seen[index, m * N_SEEN : (m + 1) * N_SEEN]
-    angle = motions.angle[index, line.angles.index(line.touched[m, A_TURN])]
+    seen = motions.seen[index][m * N_SEEN : (m + 1) * N_SEEN]
+    angle = motions.angle[index][line.angles.index(line.touched[m, A_TURN])]
     felt = felt_there(drive, machine.mesh_number, m, run.faults)
     faulty = faulty_teeth(named_by_side(drive.pairs[m]), felt)
     return mesh_state(line.pairs[m], seen, angle, faulty)
@@ -186,7 +186,7 @@ def _signals(
     nominal_angle, nominal_speed = line.running.course.nominal(times)
     rotation = line.running.line.rotation
     signals: dict[Channel, Array] = {
-        ("acceleration", dof): motions.acceleration[index, row]
+        ("acceleration", dof): motions.acceleration[index][row]
         for row, dof in enumerate(dofs)
     }
     for dof, angle in zip(line.angles, angles, strict=True):

@@ -59,21 +59,24 @@ class Motions:
 
     Parameters
     ----------
-    acceleration : (machine, channel, sample) m/s2 or rad/s2
+    acceleration : (channel, sample) m/s2 or rad/s2 of each machine
     check : (machine, channel, sample)    the beginning of the same at half the step; no sample
         without ``max_error``
-    angle : (machine, angle, sample) rad  since time 0, of the pinion or of what a line names
-    seen : (machine, row, sample)         the meshes, ``N_SEEN`` rows of ``_layout`` each; none
+    angle : (angle, sample) rad of each   since time 0, of the pinion or of what a line names
+    seen : (row, sample) of each          the meshes, ``N_SEEN`` rows of ``_layout`` each; none
         without ``with_mesh_state``
     mean_speed : (machine,) rad/s         of the first angle
     contact_loss : (machine, mesh)        share of the time without contact
     finite : (machine,)                   the motion stayed within bounds
+
+    The long series are views of the groups that were integrated together: a copy of all of them
+    into one array took longer than the settling of a machine.
     """
 
-    acceleration: Array
+    acceleration: Sequence[Array]
     check: Array
-    angle: Array
-    seen: Array
+    angle: Sequence[Array]
+    seen: Sequence[Array]
     mean_speed: Array
     contact_loss: Array
     finite: NDArray[np.bool_]

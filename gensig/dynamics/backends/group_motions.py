@@ -28,6 +28,7 @@ Stages: TypeAlias = Sequence[tuple[int, int]]
 
 # steps per sample of the repeated settling of a machine that bounced: hard landings are stiff
 CAREFUL = 3
+SHORT_ROWS = "check", "mean_speed", "contact_loss", "finite"  # of ``Motions``
 CHECKED = 0.03  # s at the beginning of a record, integrated again at half the step
 
 
@@ -49,10 +50,9 @@ def lane_groups(
     """Indices of the machines of each group; machines of one group settle in the same steps."""
     by_steps: dict[int, list[int]] = {}
     for index, machine in enumerate(machines):
-        steps = core.coarsest_oversampling(
-            machine, integration.oversampling, integration.sampling_rate
+        by_steps.setdefault(settling_steps(machine, integration, core), []).append(
+            index
         )
-        by_steps.setdefault(steps, []).append(index)
     n = n_lanes(integration.precision)
     return [
         same[first : first + n]
@@ -61,17 +61,30 @@ def lane_groups(
     ]
 
 
+def settling_steps(
+    machine: DynamicsT, integration: Integration, core: Core[DynamicsT]
+) -> int:
+    """Least steps per sample in which a machine settles."""
+    fine = integration.oversampling
+    stable = core.coarsest_oversampling(machine, fine, integration.sampling_rate)
+    return max(stable, min(core.settling_steps, fine))
+
+
 def in_order(groups: Iterable[tuple[list[int], Motions]], n_machines: int) -> Motions:
     """Motions of all machines, from the motions of groups and the indices of their machines."""
-    rows: dict[str, NDArray[np.generic]] = {}
+    rows: dict[str, Any] = {
+        field.name: [None] * n_machines for field in dataclasses.fields(Motions)
+    }
     for indices, motions in groups:
-        for field in dataclasses.fields(Motions):
-            values = getattr(motions, field.name)
-            if field.name not in rows:
-                shape = n_machines, *values.shape[1:]
-                rows[field.name] = np.empty(shape, dtype=values.dtype)
-            rows[field.name][indices] = values[: len(indices)]
-    return Motions(**rows)  # type: ignore[arg-type]
+        for name, of_machine in rows.items():
+            values = getattr(motions, name)
+            if len(indices) < len(values):  # do not keep the lanes without a machine
+                values = np.array(values[: len(indices)])
+            for lane, index in enumerate(indices):
+                of_machine[index] = values[lane]
+    for name in SHORT_ROWS:
+        rows[name] = np.array(rows[name])
+    return Motions(**rows)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,7 +115,7 @@ def integrate_group(
     precision = integration.precision
     low_pass, lanes = decimator(oversampling), fill_lanes(machines, precision)
     # output samples; time 0 is the first recorded one
-    least = core.coarsest_oversampling(machines[0], oversampling, rate)
+    least = settling_steps(machines[0], integration, core)
     settling = settling_stages(least, oversampling, rate)
     stages = [(n_steps, -low_pass.margin - before) for n_steps, before in settling]
     end = stages[-1][1]
@@ -219,10 +232,10 @@ def recorded(
     turned = angle[:, 0, -1] - angle[:, 0, 0]
     n_steps = (n_samples + 2 * low_pass.margin - 1) * fine + 1
     return Motions(
-        acceleration=acceleration,
+        acceleration=list(acceleration),
         check=check,
-        angle=angle[:, :, :-1],
-        seen=seen,
+        angle=list(angle[:, :, :-1]),
+        seen=list(seen),
         mean_speed=turned * integration.sampling_rate / n_samples,
         contact_loss=run.lost.T / n_steps,
         finite=run.is_within(OUT_OF_BOUNDS),

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from gensig.dynamics import _record_kernels
 from gensig.dynamics._layout import CENTER, N_SEEN
-from gensig.dynamics._vector import aligned
+from gensig.dynamics._record_kernels import LOW_PASS_PRECISION
+from gensig.dynamics._vector import aligned, n_lanes
 from gensig.dynamics.decimation import Decimator
 
 Array = NDArray[np.float64]
@@ -43,6 +44,8 @@ class Core(Generic[DynamicsT]):
     coarsest_oversampling : the least stable number of steps per sample of a machine, at most a
         given one, at a sampling rate
     settling_time : after which a start from rest has settled, s
+    settling_steps : least steps per sample of the settling. Machines that need more are groups
+        of their own, and each kind of group leaves lanes empty
     n_meshes, n_angles : meshes of a machine, and angles that are given out
     """
 
@@ -51,6 +54,7 @@ class Core(Generic[DynamicsT]):
     integrate: Any
     coarsest_oversampling: Callable[[DynamicsT, int, float], int]
     settling_time: Callable[[DynamicsT], float]
+    settling_steps: int = 3
     n_meshes: int = 1
     n_angles: int = 1
 
@@ -151,8 +155,12 @@ class GroupRun:
         n_rows = n_samples + 2 * margin
         angle = np.empty((n_rows, self.core.n_angles, self.n_lanes))
         seen = np.empty((len(angle), n_seen, self.n_lanes))
-        taps = low_pass.padded(self.precision)
-        n_means = _record_kernels.mean_rows(len(taps), factor) * n_channels
+        taps = low_pass.padded(LOW_PASS_PRECISION)
+        per_step = n_channels * self.n_lanes
+        n_means = _record_kernels.mean_steps(len(taps), factor) * per_step
+        width = n_lanes(LOW_PASS_PRECISION)
+        n_rows = _record_kernels.step_rows(per_step, width)
+        n_narrow = _record_kernels.narrow_steps(len(taps), factor) * n_rows * width
         _record_kernels.record(
             group,
             self.state.ravel(),
@@ -167,7 +175,8 @@ class GroupRun:
             out.ravel(),
             angle.ravel(),
             seen.ravel(),
-            aligned(np.empty(n_means * self.n_lanes, dtype=self.precision)),
+            aligned(np.empty(n_means, dtype=self.precision)),
+            aligned(np.zeros(n_narrow, dtype=LOW_PASS_PRECISION)),
             self.work,
             self.wide,
             self.near,

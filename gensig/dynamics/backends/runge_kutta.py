@@ -24,6 +24,7 @@ CORE = Core(
     integrate=_kernels.integrate,
     coarsest_oversampling=coarsest_oversampling,
     settling_time=settling_time,
+    settling_steps=1,
 )
 
 

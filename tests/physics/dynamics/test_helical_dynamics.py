@@ -346,7 +346,7 @@ class TestRecords:
 
     def test_the_loads_of_the_teeth(self, helical):
         motions = self.motions([helical], with_mesh_state=True)
-        mesh = mesh_state(helical, motions.seen[0], motions.angle[0, 0])
+        mesh = mesh_state(helical, motions.seen[0], motions.angle[0][0])
         n_pairs = helical.table.last_pitch - helical.table.first_pitch
 
         assert mesh.load_share.shape == (n_pairs, 1024)

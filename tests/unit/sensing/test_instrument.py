@@ -22,7 +22,7 @@ def test_without_drift_and_loss_no_bit_changes(group):
     assert (signal is emitted) == (group is BEARING)
 
     rng = default_rng(0)
-    assert_array_equal(signal * chain.drift(300, rng), signal)
+    assert_array_equal(chain.drifted(signal, rng), signal)
 
     same, share = chain.transmitted(signal, rng)
     assert same is signal
