@@ -33,7 +33,7 @@ def main() -> None:
         values = "".join(f"{column[row]:>22.4g}" for column in columns.values())
         print(f"  {row:<60}{values}")
     machine = _rates.machines()[0]
-    works = {"RK45": _rates.scipy_works(machine)[RK45]}
+    works = {RK45: _rates.scipy_works(machine)[RK45]}
     spent = 1e3 / _rates.rates(works, arguments.runs)[RK45]
     print(f"  {RK45 + ', ms a simulated s':<60}{spent:>22.4g}")
     print(f"\n{time.perf_counter() - begun:.0f} s")

@@ -397,14 +397,16 @@ def distinct_teeth(
 
     The first is the sound tooth; ``teeth`` are the others by (gear, tooth).
     """
-    distinct = {id(sound): sound}
+    distinct, index = [sound], {id(sound): 0}
     kind = np.zeros(sound.gear.n_teeth, dtype=np.int64)
     for gear, number in sorted(teeth):
         if gear == sound.gear.name:
             tooth = teeth[gear, number]
-            distinct.setdefault(id(tooth), tooth)
-            kind[number] = list(distinct).index(id(tooth))
-    return list(distinct.values()), kind
+            if id(tooth) not in index:
+                index[id(tooth)] = len(distinct)
+                distinct.append(tooth)
+            kind[number] = index[id(tooth)]
+    return distinct, kind
 
 
 def _structure_key(tooth: Tooth) -> tuple[int, ...]:

@@ -15,16 +15,22 @@ from gensig.dataset.storage.atomic import write_bytes
 LIBRARY_VERSIONS = ("earliest", "v110")
 
 
+ROOM = (
+    2**20
+)  # bytes for what follows the time signals, so that they are not copied for it
+
+
 class _Content(io.BytesIO):
     """Bytes that become longer, too, when their length is set, as those of a file do."""
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the length; new bytes are 0."""
+        """Set the length; new bytes are 0, and there is room for some more."""
         end = self.seek(0, io.SEEK_END)
         if size is None or size < end:
             return super().truncate(size)
         if size > end:  # else a view of the bytes may be in use
-            self.write(bytes(size - end))
+            self.write(bytes(size - end + ROOM))
+            super().truncate(size)
         return size
 
 

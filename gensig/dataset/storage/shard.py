@@ -168,6 +168,7 @@ class ShardWriter:
             for name, shape in self.signals.items():
                 if signal_column(name).is_bulk:
                     self._create_bulk(name, shape)
+            self._file.flush()  # takes the memory of all rows at once
         except BaseException:
             self._close()
             raise
