@@ -74,21 +74,32 @@ def check_step(
     fastest = float(np.abs(rates).max())
     if fastest * step > STABILITY_LIMIT:
         needed = math.ceil(oversampling * fastest * step / STABILITY_LIMIT)
-        frequency = fastest / (2 * math.pi)
-        motion = stiffest_motion(
-            dynamics.system(),
-            dynamics.approach_direction(),
-            dynamics.mean_mesh_stiffness,
-        )
-        remedy = f"raise solver.oversampling to at least {needed}"
-        if frequency > FASTEST_GEARS:
-            remedy += f", or check mass, stiffness and damping of {motion}"
-        raise SimulationError(
-            f"solver.oversampling = {oversampling} makes internal steps of {step:.3g} s, too long "
-            f"for the stiffest motion, {motion} at {frequency:.4g} Hz; {remedy}"
-        )
+        raise too_long_steps(dynamics, sampling_rate, oversampling, needed)
     if max_error is None:
         warn_of_coarse_step(dynamics, sampling_rate, oversampling)
+
+
+def too_long_steps(
+    dynamics: PairDynamics, sampling_rate: float, oversampling: int, needed: int
+) -> SimulationError:
+    """The refusal of steps that a machine cannot follow, with the motion that decides it.
+
+    ``needed`` is the least number of steps per sample.
+    """
+    step = 1.0 / (sampling_rate * oversampling)
+    frequency = float(np.abs(dynamics.stiff_rates).max()) / (2 * math.pi)
+    motion = stiffest_motion(
+        dynamics.system(),
+        dynamics.approach_direction(),
+        dynamics.mean_mesh_stiffness,
+    )
+    remedy = f"raise solver.oversampling to at least {needed}"
+    if frequency > FASTEST_GEARS:
+        remedy += f", or check mass, stiffness and damping of {motion}"
+    return SimulationError(
+        f"solver.oversampling = {oversampling} makes internal steps of {step:.3g} s, too long "
+        f"for the stiffest motion, {motion} at {frequency:.4g} Hz; {remedy}"
+    )
 
 
 def warn_of_coarse_step(

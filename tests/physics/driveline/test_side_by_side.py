@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from fault_cases import one
+from stacked_motions import integrate, stacked
 
 from gensig.driveline.reading import read_line_machine
 from gensig.driveline.side_by_side.line_dynamics import LineDynamics
@@ -16,7 +17,7 @@ from gensig.driveline.time.geared_line import GearedLine
 from gensig.driveline.time.line_mesh import pair_mesh
 from gensig.dynamics.backends.base import Integration
 from gensig.dynamics.decimation import in_band_error
-from gensig.dynamics.integrator import Solver, integrate
+from gensig.dynamics.integrator import Solver
 from gensig.dynamics.pair import PINION_ROTATION, WHEEL_ROTATION
 from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
@@ -128,7 +129,7 @@ def assert_moves_as_a_line(pair):
         precision="float64",
         max_error=None,
     )
-    found = integrate_lines([as_line(pair)], integration)
+    found = stacked(integrate_lines([as_line(pair)], integration))
 
     assert in_band_error(found.acceleration, expected.acceleration, RATE)[0] < 1e-5
     assert np.abs(found.angle - expected.angle).max() < 1e-7

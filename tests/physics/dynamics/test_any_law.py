@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 from fault_cases import one
+from stacked_motions import integrate
 
 from gensig.dynamics.backends.nystroem import method
 from gensig.dynamics.decimation import in_band_error
-from gensig.dynamics.integrator import Solver, integrate
+from gensig.dynamics.integrator import Solver
 from gensig.faults.broken import MissingTooth
 from gensig.plan.request import read_request
 from gensig.systems.pair_machine import pair_dynamics

@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fault_cases import one
+from stacked_motions import integrate
 
 from gensig.dynamics.decimation import in_band_error
-from gensig.dynamics.integrator import Solver, integrate
+from gensig.dynamics.integrator import Solver
 from gensig.faults.broken import MissingTooth
 
 RATE = 51200.0

@@ -190,7 +190,7 @@ class TestRefusals:
         }
         with pytest.raises(
             SimulationError,
-            match=r"= 2 makes too long steps",
+            match=r"= 2 makes internal steps of",
         ):
             machine(coarse).check()
 

@@ -30,11 +30,11 @@ from gensig.dynamics.backends.nystroem.stability import stable_rate
 from gensig.dynamics.backends.step_limits import (
     COARSE_STABILITY,
     settling_time,
+    too_long_steps,
     warn_of_coarse_step,
 )
 from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import PairDynamics
-from gensig.errors import SimulationError
 
 # beyond it a pair may carry outside of the path that the core follows
 MOST_CONTACT_RATIO = 2.5
@@ -118,10 +118,7 @@ class Nystroem(Backend):
         """Raise SimulationError for an unstable step; warn of a coarse unchecked one."""
         needed = math.ceil(stable_rate(machine.stiff_rates) / sampling_rate)
         if needed > oversampling:
-            raise SimulationError(
-                f"solver.oversampling = {oversampling} makes too long steps for "
-                f"solver.backend=nystroem; raise solver.oversampling to at least {needed}"
-            )
+            raise too_long_steps(machine, sampling_rate, oversampling, needed)
         if max_error is None:
             warn_of_coarse_step(machine, sampling_rate, oversampling)
 
