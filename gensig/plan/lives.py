@@ -74,7 +74,6 @@ def snapshots(config: Configuration) -> Iterator[Snapshot]:
     options = read_life(config["life"])
     n_units = _checked_units(config, options)
     machine = read_machine(config)
-    _refuse_helical_line(config, machine)
     points = _setpoints(config, options, n_units)
     n_setpoints = len(points) // n_units
     speed, torque = _speed_and_torque(machine, points, n_units)
@@ -233,17 +232,6 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
                 f"life.drift: '{key}' is drawn for each set-point already; let one of the two go"
             )
     return whole_number("plan.n_units", plan["n_units"], at_least=1)
-
-
-def _refuse_helical_line(config: Configuration, machine: Machine) -> None:
-    """Raise ConfigError for a drive line whose records follow helical gears."""
-    system = config["system"]
-    if system["kind"] == LINE and machine.pair.pinion.helix_angle != 0.0:
-        raise ConfigError(
-            f"life: on a drive line damage grows in a spur mesh, and those of system.record_mesh "
-            f"of {system.get('name')} are helical; choose a spur mesh, or take "
-            "system=helical_pair with the gears of that mesh"
-        )
 
 
 def _refuse_designs(config: Configuration, options: LifeOptions) -> None:
