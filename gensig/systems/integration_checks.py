@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.decimation import in_band_error
-from gensig.dynamics.integrator import BOUNCING, FINEST, Motions, Solver
+from gensig.dynamics.integrator import (
+    BOUNCING,
+    FINEST,
+    Motions,
+    Solver,
+    check_machine,
+)
 from gensig.dynamics.lanes import nearest_gaps
 from gensig.dynamics.pair import PairDynamics
 from gensig.errors import SimulationError, StepError
@@ -43,6 +49,20 @@ def checks(
         if agreement(signal[row], exact[row], sampling_rate).agrees[0]:
             verdicts[index] = "levels"
     return errors, verdicts
+
+
+def check_steps(machine: PairDynamics, solver: Solver, sampling_rate: float) -> None:
+    """Raise SimulationError for a machine that none of the steps can follow that are tried.
+
+    Without ``max_error`` one length is tried, else also the shorter ones of ``finer``.
+    """
+    while True:
+        try:
+            return check_machine(machine, solver, sampling_rate)
+        except StepError:
+            if solver.max_error is None or 2 * solver.oversampling > FINEST:
+                raise
+        solver = replace(solver, oversampling=2 * solver.oversampling)
 
 
 def is_too_coarse(run: Run[MachineT], record: CleanRecord | SimulationError) -> bool:

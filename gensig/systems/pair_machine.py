@@ -27,6 +27,7 @@ from gensig.sensing.encoder import Disc
 from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
 from gensig.systems.base import Machine, MachineMesh, simulate_together, specimen_table
 from gensig.systems.integration_checks import (
+    check_steps,
     checks,
     finer,
     is_too_coarse,
@@ -173,7 +174,7 @@ class GearPairMachine(Machine):
         check_channels(sensing.channels, self.channels)
         sensing.check_gears(self.gears)
         sensing.check(operating.duration)
-        check_machine(nominal, self.solver, rate)
+        check_steps(nominal, self.solver, rate)
 
     @classmethod
     def simulate_runs(

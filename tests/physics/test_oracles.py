@@ -243,7 +243,7 @@ class TestOutOfContact:
     @pytest.fixture(scope="class")
     @classmethod
     def records(cls, machine):
-        """At five steps a sample and at twenty."""
+        """At ten steps a sample and at twenty."""
         missing = tuple(MissingTooth(gear="pinion", tooth=tooth) for tooth in (3, 4))
         bouncing = {
             "operating.torque_nm": 1.0,
@@ -251,10 +251,10 @@ class TestOutOfContact:
             "operating.duration_s": 0.2,
             "solver.max_error": None,
         }
-        systems = [machine({**bouncing, "solver.oversampling": n}) for n in (5, 20)]
+        systems = [machine({**bouncing, "solver.oversampling": n}) for n in (10, 20)]
         return simulate_together([Run(system=each, faults=missing) for each in systems])
 
-    def test_five_steps_agree_with_twenty(self, records):
+    def test_ten_steps_agree_with_twenty(self, records):
         assert min(record.contact_loss_fraction for record in records) > 0.05
         coarse, fine = (record.acceleration[None] for record in records)
         assert agreement(coarse, fine, SAMPLING_RATE).agrees[0]

@@ -224,10 +224,14 @@ REFUSED = [
     ),
     (
         "two_stage_gearbox",
-        ["dataset.store_mesh_state=true"],
+        ["solver.backend=newmark", "dataset.store_mesh_state=true"],
         "take dataset.store_mesh_state=false",
     ),
-    ("two_stage_gearbox", ["solver.precision=float32"], "solver.precision=float64"),
+    (
+        "two_stage_gearbox",
+        ["solver.backend=newmark", "solver.precision=float32"],
+        "solver.precision=float64",
+    ),
     ("two_stage_gearbox", ["mesh.law=paper"], "take mesh.law=one_sided"),
     ("two_stage_gearbox", ["heat=chongqing_rated"], "heat=none"),
     ("two_stage_gearbox", ["excitation=engine_v20"], "take excitation=motor_and_load"),

@@ -23,7 +23,7 @@ from gensig.dynamics.backends.nystroem.stability import stable_rate
 from gensig.dynamics.backends.step_limits import LONGEST_SETTLING, SETTLED
 from gensig.dynamics.integrator import Solver
 from gensig.dynamics.pair import Body, PairDynamics
-from gensig.errors import SimulationError
+from gensig.errors import SimulationError, StepError
 from gensig.mesh.pair_table import PairTable
 from gensig.operation.setpoint import Operating
 from gensig.sensing.manufacturing import GearErrors
@@ -192,7 +192,7 @@ def check_line(line: LineDynamics, solver: Solver, sampling_rate: float) -> None
             )
     needed = math.ceil(stable_rate(line.stiff_rates) / sampling_rate)
     if needed > solver.oversampling:
-        raise SimulationError(
+        raise StepError(
             f"solver.oversampling = {solver.oversampling} makes too long steps for "
             f"solver.backend=nystroem; raise solver.oversampling to at least {needed}"
         )

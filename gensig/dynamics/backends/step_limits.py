@@ -9,7 +9,7 @@ import numpy as np
 
 from gensig.dynamics.pair import PairDynamics
 from gensig.dynamics.system import slowest_decay, stiffest_motion
-from gensig.errors import SimulationError
+from gensig.errors import StepError
 
 LONGEST_SETTLING = 0.45  # s
 SETTLED = 1e-4  # share of the start's transient that is left
@@ -66,7 +66,7 @@ def check_step(
     oversampling: int,
     max_error: float | None = None,
 ) -> None:
-    """Raise SimulationError for an unstable step; warn of a coarse one without ``max_error``.
+    """Raise StepError for an unstable step; warn of a coarse one without ``max_error``.
 
     With a ``max_error``, records with a larger error are integrated again at half the step.
     """
@@ -81,7 +81,7 @@ def check_step(
 
 def too_long_steps(
     dynamics: PairDynamics, sampling_rate: float, oversampling: int, needed: int
-) -> SimulationError:
+) -> StepError:
     """The refusal of steps that a machine cannot follow, with the motion that decides it.
 
     ``needed`` is the least number of steps per sample.
@@ -96,7 +96,7 @@ def too_long_steps(
     remedy = f"raise solver.oversampling to at least {needed}"
     if frequency > FASTEST_GEARS:
         remedy += f", or check mass, stiffness and damping of {motion}"
-    return SimulationError(
+    return StepError(
         f"solver.oversampling = {oversampling} makes internal steps of {step:.3g} s, too long "
         f"for the stiffest motion, {motion} at {frequency:.4g} Hz; {remedy}"
     )

@@ -23,7 +23,7 @@ from gensig.systems.base import simulate_together
 from gensig.systems.run import Run
 
 RATE = 51200.0
-LEFT = 5e-4  # of a spectrum; measured 4e-4 at 600 r/min, 2e-4 at other speeds
+LEFT = 7e-4  # of a spectrum; measured 5.3e-4 at 600 r/min, 3e-4 at other speeds
 SPEED = "operating.speed_rpm"
 # stable in longer steps than the default, in which landings fail
 CLASSICAL_SCHEME = {"solver.backend": "runge_kutta"}
@@ -116,9 +116,9 @@ def test_machines_that_begin_in_different_stages_are_independent(run, runs):
 
 
 def test_hard_landings_settle_in_finer_steps(run, runs, monkeypatch):
-    """Two teeth missing under 1.1 N m at 3600 r/min: too stiff for one step a sample."""
+    """Two teeth missing under 0.5 N m at 3600 r/min: too stiff for one step a sample."""
     missing = [MissingTooth(gear="pinion", tooth=tooth) for tooth in (3, 4)]
-    changes = {"operating.torque_nm": 1.1, SPEED: 3600, **CLASSICAL_SCHEME}
+    changes = {"operating.torque_nm": 0.5, SPEED: 3600, **CLASSICAL_SCHEME}
     bouncing = run(changes, missing)
     bouncing = replace(bouncing, specimen=None, gearbox=None)
     others = [run({SPEED: speed, **CLASSICAL_SCHEME}) for speed in (600, 1800)]

@@ -76,6 +76,7 @@ def test_without_a_helix_it_moves_like_the_spur_pair() -> None:
         "mesh.contact=linear",
         "quality.iso1328_grade=null",
         "solver.max_error=null",
+        "solver.oversampling=20",
     )
     sliced = ("system=helical_pair", "gear=xiamen_23_84", "mesh.n_slices=8")
     runs = [

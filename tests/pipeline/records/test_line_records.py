@@ -176,7 +176,7 @@ def test_a_toothed_wheel_and_the_torque_of_the_load_are_stored(tmp_path):
         (["sensing.channels=[crank_speed]"], "allowed: pinion_rotation, wheel_rot"),
         (
             ["solver.backend=euler"],
-            "solver.backend = 'euler'; allowed: runge_kutta, nystroem, newmark",
+            "solver.backend = 'euler'; allowed: runge_kutta, nystroem, other, newmark",
         ),
         (["solver.backend=other"], "take solver.backend=nystroem or newmark"),
         (["operating.torque_nm=-5"], "must be positive"),

@@ -192,7 +192,11 @@ class TestRefusals:
             SimulationError,
             match=r"= 2 makes internal steps of",
         ):
-            machine(coarse).check()
+            machine({**coarse, "solver.max_error": None}).check()
+        machine(coarse).check()  # with an error to check, shorter steps are tried
+        with pytest.raises(SimulationError, match=r"= 64 makes internal steps of"):
+            stiff = {"gear.pinion.support.stiffness_y_n_per_m": 1e14}
+            machine({**coarse, **stiff}).check()
 
     @pytest.mark.parametrize(
         ("key", "value", "motion"),

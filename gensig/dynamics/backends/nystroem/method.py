@@ -115,7 +115,7 @@ class Nystroem(Backend):
         oversampling: int,
         max_error: float | None,
     ) -> None:
-        """Raise SimulationError for an unstable step; warn of a coarse unchecked one."""
+        """Raise StepError for an unstable step; warn of a coarse unchecked one."""
         needed = math.ceil(stable_rate(machine.stiff_rates) / sampling_rate)
         if needed > oversampling:
             raise too_long_steps(machine, sampling_rate, oversampling, needed)
