@@ -23,7 +23,7 @@ from gensig.systems.base import simulate_together
 from gensig.systems.run import Run
 
 RATE = 51200.0
-LEFT = 7e-4  # of a spectrum; measured 5.3e-4 at 600 r/min, 3e-4 at other speeds
+LEFT = 5e-4  # of a spectrum; measured 4e-4 at 600 r/min, 3e-4 at other speeds
 SPEED = "operating.speed_rpm"
 # stable in longer steps than the default, in which landings fail
 CLASSICAL_SCHEME = {"solver.backend": "runge_kutta"}
