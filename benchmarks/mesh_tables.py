@@ -20,8 +20,8 @@ from gensig.plan.request import read_request
 from gensig.systems.registry import read_system
 
 KEPT = (
-    pair_table._sound_structure,
-    tooth._sound_tooth,
+    pair_table._sound_mesh,
+    tooth.healthy_tooth,
     body_coupling.shared_body_compliance,
     body_coupling.arc_flexibility,
 )

@@ -1,8 +1,26 @@
-"""The benchmark's clocks stand on functions that are there, and see the records that are made."""
+"""The benchmarks find what they measure: modules, clocked functions, and records as made."""
 
+import importlib
+import pkgutil
+
+import pytest
+
+import benchmarks
 from benchmarks._stages import CLOCKED, Stages
 from gensig.plan.make import make_plan
 from gensig.record.simulate import simulate_records
+
+WITH_ROSS = "_ross_time", "_ross_time_response", "_ross_values"
+
+
+@pytest.mark.parametrize(
+    "name", [found.name for found in pkgutil.iter_modules(benchmarks.__path__)]
+)
+def test_every_benchmark_can_be_imported(name):
+    """ROSS is installed apart."""
+    if name in WITH_ROSS:
+        pytest.importorskip("ross")
+    importlib.import_module(f"benchmarks.{name}")
 
 
 def test_every_stage_has_its_function():
