@@ -199,7 +199,7 @@ def test_two_stages_agree_with_the_implicit_method(two_stage):
 
 
 def test_both_ways_to_integrate_add_the_same_by_tilts():
-    """What the tilts of the teeth of all four gears change, where shafts lose nothing."""
+    """The change by the tilts of all four gears, where shafts lose nothing, agrees."""
     words = [
         *TWO_STAGE,
         "system.loss_factor.shaft=0",
