@@ -13,6 +13,7 @@ from gensig.driveline.time._line_mesh_kernels import mesh_law
 from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
 from gensig.driveline.time.geared_line import GearedLine, pack_meshes
 from gensig.driveline.time.line_mesh import LineMesh, phase_mesh
+from gensig.driveline.time.mesh_friction import MeshFriction, mesh_friction
 from gensig.driveline.time.newmark import LineMotion, LineSolver, _Run, _scratch
 from gensig.dynamics.pair import PairDynamics
 
@@ -82,6 +83,17 @@ def pair_line(dynamics: PairDynamics, mesh: LineMesh) -> GearedLine:
         stiffness=system.stiffness,
         rotation=system.rotation,
         meshes=(mesh,),
+    )
+
+
+def pair_friction(dynamics: PairDynamics) -> MeshFriction:
+    """The friction of a gear pair, whose pinion turns against its frame."""
+    return mesh_friction(
+        dynamics.table,
+        dynamics.approach_direction(),
+        range(6),
+        dynamics.system().rotation,
+        -1.0,
     )
 
 

@@ -26,12 +26,14 @@ from gensig.driveline.time.chords import sliced_pair_mesh
 from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
 from gensig.driveline.time.geared_line import GearedLine
 from gensig.driveline.time.line_mesh import LineMesh, pair_mesh, phase_mesh
+from gensig.driveline.time.mesh_friction import mesh_friction
 from gensig.driveline.time.newmark import (
     LineMotion,
     LineSolver,
     integrate_line,
     static_start,
 )
+from gensig.dynamics.mesh_statics import mean_friction_torque
 from gensig.errors import ConfigError, StepError
 from gensig.geometry.contact import GearPair
 from gensig.mesh.pair_table import PairTable
@@ -149,23 +151,11 @@ class RunningLine:
 
     def touched(self, mesh: int) -> list[int]:
         """Degrees of freedom of x, y and rotation of both gears of a mesh; -1: does not move so."""
-        line = self.machine.drive.line
-        driving, driven = line.meshes[mesh].driving, line.meshes[mesh].driven
-        dofs = []
-        for gear in (line.gears[driving], line.gears[driven]):
-            for axis in "xy":
-                name = f"{gear.name} {axis}"
-                dofs.append(-1)
-                if name in self.matrices.names:
-                    dofs[-1] = self.matrices.names.index(name)
-            dofs.append(_dof(self.matrices, gear.node))
-        return dofs
+        return _touched(self.machine, self.matrices, mesh)
 
     def sense(self, mesh: int) -> float:
         """1 where the driving gear of a mesh turns from x to y, else -1."""
-        line = self.machine.drive.line
-        gear = line.gears[line.meshes[mesh].driving]
-        return math.copysign(1.0, line.speed_ratio[gear.node])
+        return _sense(self.machine, mesh)
 
     def dof(self, node: int) -> int:
         """Index of the degree of freedom that a node, by its number, turns with."""
@@ -294,6 +284,17 @@ def _geared(
     held = rate / math.sqrt(float(rotation @ momentum)) * momentum
     slowed = 2.0 * governor.damping_ratio / rate
     rigid, phases = np.outer(held, held), start_rolls(machine.drive, turned)
+    meshes = tuple(
+        _mesh(
+            machine,
+            matrices,
+            number,
+            float(force),
+            tabulated.get(number),
+            float(roll),
+        )
+        for number, (force, roll) in enumerate(zip(forces, phases, strict=True))
+    )
     return GearedLine(
         names=matrices.names,
         mass=matrices.mass,
@@ -302,18 +303,44 @@ def _geared(
         rotation=rotation,
         held=held,
         held_damping=slowed,
-        meshes=tuple(
-            _mesh(
-                machine,
-                matrices,
-                number,
-                float(force),
-                tabulated.get(number),
-                float(roll),
-            )
-            for number, (force, roll) in enumerate(zip(forces, phases, strict=True))
-        ),
+        meshes=meshes,
+        friction_torque=_friction_torque(machine, matrices, meshes, forces, tabulated),
     )
+
+
+def _friction_torque(
+    machine: EngineLine,
+    matrices: LineMatrices,
+    meshes: Sequence[LineMesh],
+    forces: Array,
+    tabulated: Mapping[int, TabulatedMesh],
+) -> Array:
+    """Torques on the driving shafts that make up for the mean friction of all meshes, (dof,)."""
+    rotation, lost = matrices.rigid[0], 0.0
+    for number, teeth in tabulated.items():
+        mesh, force = meshes[number], float(forces[number])
+        torque = mean_friction_torque(
+            teeth.table,
+            reference_force(machine, number, force),
+            start_tooth_pinion=mesh.start_teeth[0],
+            start_tooth_wheel=mesh.start_teeth[1],
+            pinion_error=mesh.errors[0],
+            wheel_error=mesh.errors[1],
+            **_tilts(teeth),
+        )
+        lost += torque * float(rotation[mesh.roll_dof])
+    numbers, torques = machine.drive.numbers, np.zeros(len(rotation))
+    driving = [_dof(matrices, numbers.index(n)) for n in machine.engine.driving_nodes]
+    for dof in driving:
+        torques[dof] += lost / (len(driving) * float(rotation[dof]))
+    return torques
+
+
+def _tilts(teeth: TabulatedMesh) -> dict[str, Array]:
+    """Tilts of the teeth of both gears in m/m, where they have errors."""
+    if teeth.errors is None:
+        return {}
+    return {"pinion_tilt": teeth.errors[0].tilt, "wheel_tilt": teeth.errors[1].tilt}
 
 
 def _mesh(
@@ -348,12 +375,40 @@ def _mesh(
     if tabulated.errors is not None:
         common["errors"] = tuple(teeth.error for teeth in tabulated.errors)
         common["tilts"] = tuple(teeth.tilt for teeth in tabulated.errors)
+    common["friction"] = mesh_friction(
+        tabulated.table,
+        matrices.directions[number],
+        _touched(machine, matrices, number),
+        matrices.rigid[0],
+        _sense(machine, number),
+    )
     common["start_teeth"] = tabulated.start_teeth
     if tabulated.start_phase is not None:
         common["start_phase"] = tabulated.start_phase
     if isinstance(tabulated.table, SlicedTable):
         return sliced_pair_mesh(table=tabulated.table, **common)
     return pair_mesh(table=tabulated.table, **common)
+
+
+def _touched(machine: EngineLine, matrices: LineMatrices, number: int) -> list[int]:
+    """Degrees of freedom of x, y and rotation of both gears of a mesh; -1: does not move so."""
+    line, dofs = machine.drive.line, []
+    mesh = line.meshes[number]
+    for gear in (line.gears[mesh.driving], line.gears[mesh.driven]):
+        for axis in "xy":
+            name = f"{gear.name} {axis}"
+            dofs.append(-1)
+            if name in matrices.names:
+                dofs[-1] = matrices.names.index(name)
+        dofs.append(_dof(matrices, gear.node))
+    return dofs
+
+
+def _sense(machine: EngineLine, number: int) -> float:
+    """1 where the driving gear of a mesh turns from x to y, else -1."""
+    line = machine.drive.line
+    gear = line.gears[line.meshes[number].driving]
+    return math.copysign(1.0, line.speed_ratio[gear.node])
 
 
 def _dof(matrices: LineMatrices, number: int) -> int:

@@ -8,26 +8,23 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.helical import AXIAL_DOFS, axial_reach, pitches
-from gensig.dynamics.mesh_statics import loss_arm, mean_mesh_stiffness
+from gensig.dynamics.mesh_statics import (
+    mean_friction_torque,
+    mean_mesh_stiffness,
+    static_load,
+    tooth_states,
+)
 from gensig.dynamics.system import LumpedSystem, eigenvalues
 from gensig.errors import ConfigError
-from gensig.mesh.load_distribution import (
-    PairStates,
-    StaticMesh,
-    pair_states,
-    static_mesh,
-)
+from gensig.mesh.load_distribution import PairStates, StaticMesh
 from gensig.mesh.pair_table import PairTable
-from gensig.mesh.sliced.sliced_statics import (
-    ChordStates,
-    chord_equilibrium,
-    chord_states,
-)
+from gensig.mesh.sliced.sliced_statics import ChordStates
 from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.operation.setpoint import Nominal, Operating
 from gensig.units import split_unit, unit
@@ -45,9 +42,6 @@ PAIR_DOFS = (
 # all that a machine may have; ``PairDynamics.dofs`` lists its own
 DOFS = (*PAIR_DOFS, *AXIAL_DOFS, "motor_rotation", "load_rotation")
 APPROACH_SIGN = (0.0, -1.0, 1.0, 0.0, 1.0, -1.0)
-# a prime, so that the rolls sample each tooth at other positions than the last. Another number
-# changes the level of a record by up to 0.3 %, and no longer makes the frozen benchmark
-FRICTION_POSITIONS = 509
 # fields of the teeth that meet, and arguments of the statics
 TOOTH_FIELDS = (
     "start_tooth_pinion",
@@ -356,12 +350,7 @@ class PairDynamics:
 
         From the static loads over one turn of the wheel.
         """
-        pair = self.table.pair
-        shares = (np.arange(FRICTION_POSITIONS) + 0.5) / FRICTION_POSITIONS
-        states = self.states(pair.base_pitch * pair.wheel.n_teeth * shares)
-        load = self.static(states, self.mesh_force).load
-        lost = (load * loss_arm(self.table, states.position)).sum(axis=1)
-        return self.table.options.friction_coefficient * float(np.mean(lost))
+        return mean_friction_torque(self.table, self.mesh_force, **self._teeth)
 
     def rest(self) -> Array:
         """Deflections of supports and couplings about which the machine moves, (dof,).
@@ -417,18 +406,15 @@ class PairDynamics:
 
     def states(self, roll: Array) -> PairStates | ChordStates:
         """Pairs of teeth at rolls of the pinion in m, (phase,)."""
-        teeth = {name: getattr(self, name) for name in TOOTH_FIELDS}
-        if isinstance(self.table, SlicedTable):
-            return chord_states(self.table, roll, **teeth)
-        return pair_states(self.table, roll, **teeth)
+        return tooth_states(self.table, roll, **self._teeth)
 
     def static(self, states: PairStates | ChordStates, force: float) -> StaticMesh:
         """Equilibrium of pairs of teeth under a normal force in N."""
-        if isinstance(self.table, SlicedTable):
-            assert isinstance(states, ChordStates)
-            return chord_equilibrium(self.table, states, force)
-        assert isinstance(states, PairStates)
-        return static_mesh(self.table, states, force)
+        return static_load(self.table, states, force)
+
+    @property
+    def _teeth(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in TOOTH_FIELDS}
 
 
 def _couple(matrix: Array, first: int, second: int, value: float) -> None:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from gensig.driveline.line_gears import STILL
 from gensig.driveline.running import RunningLine, reference_force
+from gensig.driveline.time.mesh_friction import slide_direction
 from gensig.driveline.time.newmark import static_start
-from gensig.dynamics.backends.nystroem import _line_layout as lines
 from gensig.dynamics.backends.nystroem._layout import FOLLOWED
 from gensig.dynamics.backends.nystroem.method import (
     MOST_CONTACT_RATIO,
@@ -48,7 +48,6 @@ class LineDynamics:
     touched : (mesh, 6) degrees of freedom of x, y and rotation of gear a and of gear b, -1 for a
         gear that does not move so
     senses : (mesh,) 1 where gear a turns from x to y, else -1
-    drive : degree of freedom that makes up for the mean friction
     angles : degrees of freedom whose angles are given out
     """
 
@@ -56,7 +55,6 @@ class LineDynamics:
     pairs: tuple[PairDynamics, ...]
     touched: Index
     senses: Array
-    drive: int
     angles: tuple[int, ...]
 
     @property
@@ -76,27 +74,15 @@ class LineDynamics:
 
     @property
     def slide(self) -> Array:
-        """Direction of friction along the degrees of freedom of every mesh, (mesh, 6).
-
-        Gear a of a pair that turns against its frame feels it along x, which is y turned back by a
-        right angle; a mirrored pair feels it the other way.
-        """
+        """Direction of friction along the degrees of freedom of every mesh, (mesh, 6)."""
         slide = np.zeros_like(self.reach)
-        # the gradient is -y of the frame on gear a and y on gear b, and so is friction along x
-        for first in (lines.A_X, lines.B_X):
-            slide[:, first] = self.senses * self.reach[:, first + 1]
-            slide[:, first + 1] = -self.senses * self.reach[:, first]
+        meshes = zip(
+            slide, self.running.line.meshes, self.touched, self.senses, strict=True
+        )
+        for row, mesh, dofs, sense in meshes:
+            along = slide_direction(mesh.direction, dofs, sense)
+            row[dofs >= 0] = along[dofs[dofs >= 0]]
         return slide
-
-    @cached_property
-    def friction_torque(self) -> float:
-        """Mean friction torque of all meshes, reduced to the drive, N m."""
-        rotation = self.running.line.rotation
-        lost = [
-            pair.friction_torque() * rotation[dofs[lines.A_TURN]]
-            for pair, dofs in zip(self.pairs, self.touched, strict=True)
-        ]
-        return float(sum(lost) / rotation[self.drive])
 
     @cached_property
     def stiff_rates(self) -> NDArray[np.complex128]:
@@ -149,7 +135,8 @@ class LineDynamics:
             if torque.factor is not None:
                 factor = np.interp(times, self.running.course.time, torque.factor)
             forces[:, torque.dof] += float(torque.table.mean()) * factor
-        forces[:, self.drive] += self.friction_torque
+        if self.running.line.friction_torque is not None:
+            forces += self.running.line.friction_torque
         return forces
 
 
@@ -157,7 +144,6 @@ def line_dynamics(
     running: RunningLine,
     operating: Operating,
     *,
-    drive: int,
     angles: Sequence[int],
 ) -> LineDynamics:
     """The motion of a line whose meshes all have tables of spur teeth.
@@ -165,7 +151,6 @@ def line_dynamics(
     Parameters
     ----------
     operating : options of the set-point; its speed and torque are not read
-    drive : number of the node that turns the line
     angles : numbers of the nodes whose angles are given out
     """
     speed = float(running.course.speed[0])
@@ -175,7 +160,6 @@ def line_dynamics(
         pairs=tuple(_pair(running, m, operating, speed) for m in meshes),
         touched=np.array([running.touched(m) for m in meshes], dtype=np.int64),
         senses=np.array([running.sense(m) for m in meshes]),
-        drive=running.dof(drive),
         angles=tuple(running.dof(node) for node in angles),
     )
 

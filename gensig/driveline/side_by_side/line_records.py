@@ -90,7 +90,6 @@ def dynamics_of(run: LineRun) -> LineDynamics:
     return line_dynamics(
         machine.line(run),
         machine.operating,
-        drive=engine.engine.driving_nodes[0],
         angles=turned,
     )
 

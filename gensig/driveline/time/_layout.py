@@ -9,8 +9,15 @@ from gensig.dynamics._vector import inlined
 # numbers of a mesh
 (
     BACKLASH, DAMPING, SHARED, START, NOMINAL_PITCHES, PITCHES_PER_RAD, MIRROR, UPRIGHT,
-    LEAST_GAP, LEAST_COAST_GAP, N_NUMBERS,
+    LEAST_GAP, LEAST_COAST_GAP, AT_FRICTION,
 ) = range(11)  # fmt: skip
+# behind them those of ``MeshFriction.numbers``: the pair stands at its pitches times BASE_PITCH,
+# less LAG; PER_WIDTH is 2 over the length in which sliding turns round
+(
+    COEFFICIENT, BASE_PITCH, LAG, PITCH_POINT, PER_WIDTH, PATH, START_CURVATURE,
+    TANGENT_LENGTH, N_FRICTION,
+) = range(9)  # fmt: skip
+N_NUMBERS = AT_FRICTION + N_FRICTION
 # whole numbers of a mesh; those called AT_ say where a flat array begins
 (
     ROLL_DOF, N_PAIRS, FIRST, NODES, AT_TABLE, AT_ROWS, AT_COAST_ROWS, TEETH_A, TEETH_B,
@@ -21,10 +28,15 @@ from gensig.dynamics._vector import inlined
 # grows as the mesh rolls on
 GAP, GAP_SLOPE, STIFFNESS = range(3)
 PER_SPRING = 2
+# behind the springs: where the pair stands, pitches from A, and its normal force
+PLACE, PRESSED, N_BEHIND = -2, -1, 2
 DRIVE, COAST, N_FLANKS = range(3)
 # what a mesh does at an instant; LOST is a power, ALONG the force on the roll coordinate, J per
-# pitch
-FORCE, TANGENT, RATE_TANGENT, STORED, LOST, ALONG, N_LAW = range(7)
+# pitch; RUBBING the friction force, MOMENT_A and MOMENT_B its moments about both gears
+(
+    FORCE, TANGENT, RATE_TANGENT, STORED, LOST, ALONG, RUBBING, MOMENT_A, MOMENT_B, N_LAW,
+) = range(10)  # fmt: skip
+N_RUBBING = 3
 # what a mesh has done: contact lost and back flanks loaded in steps, extreme forces
 APART, BEHIND, LARGEST, LEAST, N_TALLY = range(5)
 # sums of a run in J, then counts
@@ -143,6 +155,8 @@ class Line(NamedTuple):
 
     ``direction`` are the gradients of the approaches as rows; ``answer`` (mesh, dof) what one
     newton of a mesh moves, ``compliance`` (mesh, mesh) what it takes from the approaches.
+    ``rubbing`` has three rows a mesh, along which its friction and both moments act; ``given``
+    (dof,) are constant torques that make up for the mean of it.
     ``rotation`` (dof,) is the nominal rotation of each per that of the reference, ``carried`` M
     times it.
     """
@@ -151,6 +165,8 @@ class Line(NamedTuple):
     damping: Padded
     stiffness: Padded
     direction: Rows
+    rubbing: Rows
+    given: Any
     factor: Factor
     answer: Any
     compliance: Any

@@ -78,6 +78,7 @@ def gather(meshes, mesh, flank, turned, within, pairs):
         if row < 0:
             here[layout.GAP] = np.inf
             continue
+        here[layout.PLACE] = turned - index
         x = (turned - (index + first)) * n_nodes
         cell = min(max(int(x), 0), n_cells - 1)
         low = node_offset(integers, row, n_cells, cell)
@@ -111,6 +112,8 @@ def flank_law(pairs, depth, damping, shared, within, rate, roll_rate):
     """Law of the gathered pairs of a flank, ``within`` m beyond where sound teeth touch; their
     springs begin at ``depth`` (spring,) m beyond the gap.
 
+    Sets the normal force of every pair, where there is any force.
+
     Returns
     -------
     what ``_layout.N_LAW`` names: force, its slopes over approach and rate, stored energy, power
@@ -138,6 +141,7 @@ def flank_law(pairs, depth, damping, shared, within, rate, roll_rate):
     normal, tangent, rate_tangent, lost, along = 0.0, 0.0, 0.0, 0.0, 0.0
     stored = 0.5 * shared * total * total
     for j in range(len(pairs)):
+        on_pair = 0.0
         for spring in range(len(depth)):
             bite = within - pairs[j, layout.GAP] - depth[spring] - shared * total
             if not bite > 0.0:
@@ -152,11 +156,40 @@ def flank_law(pairs, depth, damping, shared, within, rate, roll_rate):
                 pressed = elastic * grown
                 tangent += stiff * softer * grown
                 rate_tangent += elastic * damping
-            normal += pressed
+            on_pair += pressed
             stored += 0.5 * elastic * bite
             lost += (pressed - elastic) * speed
             along += pressed * slope - 0.5 * bite * bite * pairs[j, column + 1]
+        normal += on_pair
+        pairs[j, layout.PRESSED] = on_pair
     return normal, tangent, rate_tangent, stored, lost, along
+
+
+@compiled
+def rub(meshes, mesh, law, work):
+    """Add friction and its moments of the drive flank of a mesh to ``law`` (mesh, N_LAW).
+
+    The law of the mesh has just been evaluated. Pairs slide one way before the pitch point and the
+    other behind it.
+    """
+    number, first, law = meshes.number[mesh], layout.AT_FRICTION, law[mesh]
+    if not (number[first + layout.COEFFICIENT] > 0.0 and law[layout.FORCE] > 0.0):
+        return
+    pairs = work.pairs[mesh, DRIVE]
+    for j in range(meshes.integers[mesh, layout.N_PAIRS]):
+        pressed = pairs[j, layout.PRESSED]
+        if not pressed > 0.0:
+            continue
+        place = number[first + layout.BASE_PITCH] * pairs[j, layout.PLACE]
+        place -= number[first + layout.LAG]
+        x = place - number[first + layout.PITCH_POINT]
+        x = min(max(x * number[first + layout.PER_WIDTH], -1.0), 1.0)
+        force = number[first + layout.COEFFICIENT] * pressed * x * (1.5 - 0.5 * x * x)
+        arm = min(max(place, 0.0), number[first + layout.PATH])
+        arm += number[first + layout.START_CURVATURE]
+        law[layout.RUBBING] += force
+        law[layout.MOMENT_A] -= force * arm
+        law[layout.MOMENT_B] += force * (number[first + layout.TANGENT_LENGTH] - arm)
 
 
 @compiled

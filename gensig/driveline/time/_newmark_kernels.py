@@ -9,7 +9,12 @@ from __future__ import annotations
 import math
 
 from gensig.driveline.time import _layout as layout
-from gensig.driveline.time._line_mesh_kernels import gather, mesh_law, solve_contact
+from gensig.driveline.time._line_mesh_kernels import (
+    gather,
+    mesh_law,
+    rub,
+    solve_contact,
+)
 from gensig.dynamics._tableau import NEWMARK
 from gensig.dynamics._vector import compiled
 
@@ -167,7 +172,7 @@ def push(line, torques, angle, gain, knot, share, q, force):
     (dof,).
     """
     for i in range(len(force)):
-        force[i] = -gain * line.carried[i]
+        force[i] = line.given[i] - gain * line.carried[i]
     for j in range(len(torques.dof)):
         dof, first = torques.dof[j], torques.first[j]
         n_nodes = torques.first[j + 1] - first
@@ -202,6 +207,17 @@ def roll(meshes, angle, speed, q, v, turned, roll_rate):
 
 
 @compiled
+def add_friction(line, law, force):
+    """Add the friction of all meshes, ``law`` (mesh, N_LAW), to ``force`` (dof,)."""
+    rows = line.rubbing
+    for m in range(len(law)):
+        for k in range(layout.N_RUBBING):
+            part, i = law[m, layout.RUBBING + k], layout.N_RUBBING * m + k
+            for p in range(rows.first[i], rows.first[i + 1]):
+                force[rows.column[p]] += part * rows.value[p]
+
+
+@compiled
 def look(line, meshes, torques, course, time, state, work):
     """Torques, approaches and what the meshes do in a given state, so that ``advance`` can go on
     from there.
@@ -218,6 +234,8 @@ def look(line, meshes, torques, course, time, state, work):
             row_product(line.direction, m, v),
         )
         mesh_law(meshes, m, turned[m], roll_rate[m], approach[m], rate[m], law, work)
+        rub(meshes, m, law, work)
+    add_friction(line, law, force)
 
 
 @compiled
@@ -277,16 +295,19 @@ def advance(
         push(line, torques, angle, gain, knot, share, ahead_q, force_1)
         roll(meshes, angle, speed, ahead_q, ahead_v, turned, roll_rate)
         work.reach[:] = -math.inf
-        for i in range(n):
-            moved[i] = force[i] + force_1[i]
-        add_product(line.stiffness, -2.0, q, moved)
-        add_product(line.mass, 2.0 * per_step, v, moved)
         for m in range(n_meshes):
             approach_1[m] = row_product(line.direction, m, ahead_q)
             rate_1 = per_step * (approach_1[m] - approach[m]) - rate[m]
             mesh_law(
                 meshes, m, turned[m], roll_rate[m], approach_1[m], rate_1, law_1, work
             )
+            rub(meshes, m, law_1, work)
+        add_friction(line, law_1, force_1)
+        for i in range(n):
+            moved[i] = force[i] + force_1[i]
+        add_product(line.stiffness, -2.0, q, moved)
+        add_product(line.mass, 2.0 * per_step, v, moved)
+        for m in range(n_meshes):
             along = law[m, layout.ALONG] + law_1[m, layout.ALONG]
             moved[meshes.integers[m, layout.ROLL_DOF]] += (
                 along * meshes.number[m, layout.PITCHES_PER_RAD]

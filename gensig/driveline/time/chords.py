@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.driveline.time.line_mesh import LineMesh, tilts_a_pitch
+from gensig.driveline.time.mesh_friction import MeshFriction
 from gensig.mesh.sliced.sliced_table import SlicedTable
 
 Array = NDArray[np.float64]
@@ -25,6 +26,7 @@ def sliced_pair_mesh(
     tilts: tuple[Array, Array] | None = None,
     start_teeth: tuple[int, int] = (0, 0),
     start_phase: float = 0.0,
+    friction: MeshFriction | None = None,
 ) -> LineMesh:
     """A helical mesh, or a spur one in slices; gear a is the pinion, ``direction`` that of the
     transverse force.
@@ -67,4 +69,5 @@ def sliced_pair_mesh(
         backlash=pair.backlash,
         damping=damping,
         shared_compliance=table.shared_compliance,
+        friction=friction,
     )

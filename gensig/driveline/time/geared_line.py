@@ -37,6 +37,9 @@ class GearedLine:
 
     A governor is part of both: its stiffness is ``held`` times ``held`` (dof,), its damping
     ``held_damping`` s times as much. None without one.
+
+    ``friction_torque`` (dof,) N m is what the drive gives to make up for the mean friction of the
+    meshes; statics know neither. None without any.
     """
 
     names: tuple[str, ...]
@@ -47,6 +50,7 @@ class GearedLine:
     meshes: tuple[LineMesh, ...]
     held: Array | None = None
     held_damping: float = 0.0
+    friction_torque: Array | None = None
 
     def __post_init__(self) -> None:
         n = len(self.names)
@@ -118,6 +122,9 @@ def pack_line(
     factor = _factor(dynamic, [line.names[i] for i in order], step)
     kernels.respond(factor, rows, answer, compliance)
     rotation = line.rotation[order]
+    given = np.zeros(len(order))
+    if line.friction_torque is not None:
+        given = line.friction_torque[order]
     sparse_mass, carried = _padded(mass), np.zeros(len(order))
     kernels.add_product(sparse_mass, 1.0, rotation, carried)
     return Line(
@@ -125,6 +132,8 @@ def pack_line(
         damping=_padded(damping),
         stiffness=_padded(stiffness),
         direction=rows,
+        rubbing=_rows(_rubbing(line, order)),
+        given=given,
         factor=factor,
         answer=answer,
         compliance=compliance,
@@ -174,6 +183,7 @@ def pack_meshes(line: GearedLine, order: Index) -> Meshes:
             mesh.backlash, mesh.damping, mesh.shared_compliance, mesh.start_phase,
             abs(turning) * per_rad, np.sign(turning) * per_rad, mesh.mirror,
             mesh.upright, mesh.least_gap - smoothed, mesh.gap.min() - smoothed,
+            *_friction(mesh),
         )  # fmt: skip
         integers[m] = (
             at_of[mesh.roll_dof], mesh.n_pairs, mesh.first_pitch,
@@ -274,6 +284,23 @@ def _direction(line: GearedLine, order: Index) -> Array:
     return np.array([mesh.direction[order] for mesh in line.meshes]).reshape(
         -1, len(order)
     )
+
+
+def _rubbing(line: GearedLine, order: Index) -> Array:
+    """Where the friction of every mesh and its moments act, (3 mesh, dof)."""
+    rows = np.zeros((layout.N_RUBBING * len(line.meshes), len(order)))
+    for m, mesh in enumerate(line.meshes):
+        if mesh.friction is not None:
+            first = layout.N_RUBBING * m
+            rows[first : first + layout.N_RUBBING] = mesh.friction.directions[:, order]
+    return rows
+
+
+def _friction(mesh: LineMesh) -> Array:
+    """Numbers of the friction of a mesh, (N_FRICTION,); 0 without any."""
+    if mesh.friction is None:
+        return np.zeros(layout.N_FRICTION)
+    return mesh.friction.numbers
 
 
 def _rows(matrix: Array) -> Rows:

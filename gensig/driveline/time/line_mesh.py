@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.driveline.time.mesh_friction import MeshFriction
 from gensig.errors import ConfigError, GeometryError
 from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS, PairTable
 
@@ -45,6 +46,7 @@ class LineMesh:
     damping : s/m                      times the rate of a pair is the share by which it raises
         its elastic force
     shared_compliance : m/N            what all pairs in contact share
+    friction : of the drive flanks; None for a mesh that slides freely
     """
 
     name: str
@@ -67,6 +69,7 @@ class LineMesh:
     damping: float
     shared_compliance: float = 0.0
     depth: Array = field(default_factory=lambda: np.zeros(1))
+    friction: MeshFriction | None = None
 
     def __post_init__(self) -> None:
         self._check_tables()
@@ -232,9 +235,10 @@ def pair_mesh(
     tilts: tuple[Array, Array] | None = None,
     start_teeth: tuple[int, int] = (0, 0),
     start_phase: float = 0.0,
+    friction: MeshFriction | None = None,
 ) -> LineMesh:
-    """A spur mesh of our own tables; gear a is the pinion. The law is that of the pair dynamics,
-    without friction. ``tilts`` (tooth,) are in m/m, as those of the pair.
+    """A spur mesh of our own tables; gear a is the pinion. The law is that of the pair dynamics.
+    ``tilts`` (tooth,) are in m/m, as those of the pair.
 
     The back flanks are sound teeth without errors, mirrored as the pair dynamics mirrors them; a
     missing tooth is missing there too.
@@ -270,6 +274,7 @@ def pair_mesh(
         backlash=pair.backlash,
         damping=damping,
         shared_compliance=table.shared_compliance,
+        friction=friction,
     )
 
 

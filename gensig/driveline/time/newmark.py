@@ -183,7 +183,8 @@ def static_start(
     (dof,).
 
     Torques over an angle act with the mean of their tables. What they do not balance accelerates
-    a free line as one rigid body, and the line is at rest in that motion.
+    a free line as one rigid body, and the line is at rest in that motion. Friction, and what makes
+    up for it, are left out.
 
     Raises
     ------
@@ -191,6 +192,7 @@ def static_start(
     """
     order = elimination_order(line)
     still = pack_line(line, order, STILL, 0.0, "at rest")
+    still = still._replace(given=np.zeros(len(order)))
     meshes = pack_meshes(line, order)
     pushed = pack_torques(line, order, torques, course)
     means = np.array([torque.table.mean() for torque in torques])
@@ -353,7 +355,7 @@ def _scratch(line: GearedLine) -> Work:
     n, m = len(line.names), len(line.meshes)
     most = max([1, *[mesh.n_pairs for mesh in line.meshes]])
     most_springs = max([1, *[len(mesh.depth) for mesh in line.meshes]])
-    n_columns = layout.STIFFNESS + layout.PER_SPRING * most_springs
+    n_columns = layout.STIFFNESS + layout.PER_SPRING * most_springs + layout.N_BEHIND
     return Work._make(
         [
             *np.zeros((4, n)),

@@ -13,6 +13,7 @@ from lane_tools import advance
 from line_tools import (
     constant_torques,
     law_at,
+    pair_friction,
     pair_line,
     state_after,
 )
@@ -208,12 +209,7 @@ class TestAgainstThePair:
     @pytest.fixture(scope="class", params=["sound", "missing tooth"])
     @classmethod
     def dynamics(cls, request, machine, dynamics_of):
-        spur = machine(
-            {
-                "mesh.friction_coefficient": 0.0,
-                "mesh.points_per_pitch": 2048,
-            }
-        )
+        spur = machine({"mesh.points_per_pitch": 2048})
         table = Slices(spur, HELIX).table(DEPTH)
         if request.param == "missing tooth":
             kind = np.zeros_like(table.pinion_kind)
@@ -253,6 +249,7 @@ class TestAgainstThePair:
                 dynamics.pinion_error,
                 dynamics.wheel_error,
             ),
+            friction=pair_friction(dynamics),
         )
         q_1, v_1, motion = moved(pair_line(dynamics, mesh), dynamics)
         start = (

@@ -14,6 +14,7 @@ from line_tools import (
     STIFFNESS,
     constant_torques,
     order_of,
+    pair_friction,
     pair_line,
     state_after,
     steps,
@@ -25,6 +26,7 @@ from benchmarks._engine_line import engine_line, engine_torques
 from gensig.driveline.time.course import constant_speed
 from gensig.driveline.time.line_mesh import pair_mesh
 from gensig.driveline.time.newmark import integrate_line, static_start
+from gensig.dynamics.pair import PINION_ROTATION
 from gensig.faults.broken import MissingTooth
 
 
@@ -148,8 +150,8 @@ class TestBacklash:
 
 
 class TestAgainstThePair:
-    """The default spur pair on its supports without friction, with errors and tilts of its teeth,
-    through both integrators.
+    """The default spur pair on its supports, with errors and tilts of its teeth, through both
+    integrators.
     """
 
     STEPS = 64
@@ -163,12 +165,7 @@ class TestAgainstThePair:
     def dynamics(cls, request, machine, dynamics_of):
         rng = np.random.default_rng(1)
         faults = request.param
-        pair = machine(
-            {
-                "mesh.friction_coefficient": 0.0,
-                "mesh.points_per_pitch": 2048,
-            }
-        )
+        pair = machine({"mesh.points_per_pitch": 2048})
         errors = {
             "pinion_error": rng.normal(0, 3e-6, 23),
             "wheel_error": rng.normal(0, 3e-6, 84),
@@ -195,6 +192,7 @@ class TestAgainstThePair:
                 dynamics.pinion_tilt,
                 dynamics.wheel_tilt,
             ),
+            friction=pair_friction(dynamics),
         )
         return pair_line(dynamics, mesh)
 
@@ -219,10 +217,13 @@ class TestAgainstThePair:
         assert motion.energy_residual < 1e-4
 
     def test_the_same_rest(self, dynamics, line):
+        """Statics leave out friction, and what makes up for it."""
+        torques = dynamics.system().force
+        torques[PINION_ROTATION] -= dynamics.friction_torque()
         computed = static_start(
             line,
             constant_speed(dynamics.operating.speed),
-            constant_torques(dynamics.system().force),
+            constant_torques(torques),
             time=0.0,
         )
         expected = dynamics.static_start(0.0)

@@ -64,6 +64,8 @@ def as_line(pair):
     held = np.zeros(len(system.mass))
     held[PINION_ROTATION] = math.sqrt(pair.drive_stiffness)
     drive_damping = system.damping[PINION_ROTATION, PINION_ROTATION]
+    friction_torque = np.zeros(len(system.mass))
+    friction_torque[PINION_ROTATION] = pair.friction_torque()
     line = GearedLine(
         names=system.names,
         mass=np.diag(system.mass),
@@ -73,6 +75,7 @@ def as_line(pair):
         meshes=(mesh,),
         held=held,
         held_damping=drive_damping / pair.drive_stiffness,
+        friction_torque=friction_torque,
     )
     torque = pair.operating.torque
     driven = np.array([-torque * pair.table.pair.ratio])
@@ -90,7 +93,6 @@ def as_line(pair):
         pairs=(pair,),
         touched=np.arange(6)[None],
         senses=np.array([-1.0]),
-        drive=PINION_ROTATION,
         angles=(PINION_ROTATION,),
     )
 
@@ -180,57 +182,42 @@ def test_two_stages_are_accurate_to_a_thousandth(two_stage):
     assert 0.0 < error < 1e-3
 
 
-def test_two_stages_agree_with_the_implicit_method(two_stage):
-    """Without friction and roll torque, which that method leaves out, and below the mesh modes."""
-    mesh = replace(two_stage.mesh, friction_coefficient=0.0, roll_torque="classical")
-    machine = replace(two_stage, mesh=mesh)
-    slow = with_solver(machine, backend="newmark", oversampling=40)
-    found, expected = recorded(run_of(machine), run_of(slow))
-    names = machine.sensing.channels
-    for name in ("pinion_y", "wheel_y"):
-        row = names.index(name)
-        spectra = [
-            np.fft.rfft(record.acceleration[row] * np.hanning(len(record.shaft_angle)))
-            for record in (found, expected)
-        ]
-        band = slice(50, 1500)  # 500 Hz to 15 kHz, ten hertz apart
-        off = np.linalg.norm(spectra[0][band] - spectra[1][band])
-        assert off < 0.05 * np.linalg.norm(spectra[1][band])
+@pytest.mark.parametrize("grade", [None, 6], ids=["perfect", "grade 6"])
+def test_two_stages_agree_with_the_implicit_method(grade):
+    """Both methods have one law of the teeth, friction and tilts included.
 
-
-def test_both_ways_to_integrate_add_the_same_by_tilts():
-    """The change by the tilts of all four gears, where shafts lose nothing, agrees."""
+    They differ in the dampers of the shafts, which have none here, and in where their records
+    begin, which a quick governor forgets.
+    """
     words = [
         *TWO_STAGE,
         "system.loss_factor.shaft=0",
         "system.loss_factor.coupling=0",
-        "mesh.friction_coefficient=0",
-        "mesh.roll_torque=classical",
-        "quality.iso1328_grade=6",
+        "operating.drive_frequency_hz=20",
+        "sensing.channels=[pinion_x, pinion_y, wheel_y]",
     ]
+    if grade is not None:
+        words.append(f"quality.iso1328_grade={grade}")
     machine = read_line_machine(read_request(words).config)
-    tilted = specimen_of(machine)
-    others = {
-        name: replace(gear, tilt=np.zeros_like(gear.tilt))
-        for name, gear in tilted.others.items()
-    }
-    upright = replace(tilted, pinion_tilt=0.0, wheel_tilt=0.0, others=others)
-    slow = with_solver(machine, backend="newmark", oversampling=12)
-    runs = [
-        run_of(each, specimen=specimen)
-        for each in (machine, slow)
-        for specimen in (tilted, upright)
-    ]
-    row = machine.sensing.channels.index("pinion_y")
-    spectra = [
-        np.fft.rfft(record.acceleration[row] * np.hanning(len(record.shaft_angle)))
-        for record in recorded(*runs)
-    ]
-    band = slice(50, 1500)  # 500 Hz to 15 kHz, ten hertz apart
-    found, expected = spectra[0] - spectra[1], spectra[2] - spectra[3]
-    off = np.linalg.norm(found[band] - expected[band])
-    assert off < 0.08 * np.linalg.norm(expected[band])
-    assert np.linalg.norm(expected[band]) > 0.3 * np.linalg.norm(spectra[2][band])
+    specimen = None
+    if grade is not None:
+        specimen = specimen_of(machine)
+    slow = with_solver(machine, backend="newmark", oversampling=40)
+    smooth = replace(slow, mesh=replace(slow.mesh, friction_coefficient=0.0))
+    runs = [run_of(each, specimen=specimen) for each in (machine, slow, smooth)]
+    records = recorded(*runs)
+    for row in range(len(machine.sensing.channels)):
+        found, expected, other = (
+            spectrum(record.acceleration[row]) for record in records
+        )
+        size = np.linalg.norm(expected)
+        assert np.linalg.norm(found - expected) < 3e-3 * size
+        assert np.linalg.norm(other - expected) > 0.02 * size
+
+
+def spectrum(signal):
+    """Spectrum of a signal of 0.1 s from 500 Hz to 15 kHz, ten hertz apart."""
+    return np.fft.rfft(signal * np.hanning(len(signal)))[50:1500]
 
 
 def test_a_record_does_not_depend_on_its_neighbours(two_stage):
