@@ -7,7 +7,6 @@ mesh; ``operating`` is the motion of the driving gear's shaft.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self, final
@@ -37,7 +36,7 @@ from gensig.driveline.machine_checks import (
     spur_table,
     warn_of_supports,
 )
-from gensig.driveline.mesh_phase import start_phase
+from gensig.driveline.mesh_phase import driving_angle
 from gensig.driveline.running import (
     Governor,
     RunningLine,
@@ -49,6 +48,7 @@ from gensig.driveline.running import (
     single_thread,
     steady_course,
 )
+from gensig.driveline.side_by_side.line_pairs import driving_angles, line_mesh_states
 from gensig.driveline.side_by_side.line_records import LineSignals, simulate_lines
 from gensig.driveline.teeth import (
     ToothLaw,
@@ -62,7 +62,9 @@ from gensig.driveline.teeth import (
 )
 from gensig.driveline.time.newmark import LineMotion, LineSolver
 from gensig.driveline.wheel_channels import wheel_of, wheel_speed
+from gensig.dynamics._layout import MOST_PAIRS
 from gensig.dynamics.integrator import check_memory
+from gensig.dynamics.mesh_state import MeshState
 from gensig.dynamics.pair import Body
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.base import Fault
@@ -172,10 +174,10 @@ class LineMachine(Machine):
 
     @property
     def most_pairs(self) -> int:
-        """Pairs of teeth of the followed mesh whose loads are known at once."""
-        if self.side_by_side:
-            return N_PAIRS
-        return 0
+        """Pairs of teeth of a mesh that are followed at once."""
+        if any(pair.pinion.helix_angle != 0.0 for pair in self.engine.drive.pairs):
+            return MOST_PAIRS
+        return N_PAIRS
 
     @property
     def torque_of(self) -> str:
@@ -375,8 +377,16 @@ class LineMachine(Machine):
     def _record(self, run: Run[LineMachine]) -> CleanRecord:
         line = self.line(run)
         kinds = [self.channel(line, name) for name in self.sensing.channels]
-        motion, angle = self._integrate(line, self.operating.duration, kinds)
+        if run.with_mesh_state:
+            kinds += driving_angles(line)
+        motion, angle = self._integrate(
+            line, self.operating.duration, kinds, with_pairs=run.with_mesh_state
+        )
         turned = float(angle[-1] - angle[0])
+        mesh: MeshState | None = None
+        further: tuple[MeshState, ...] = ()
+        if run.with_mesh_state:
+            mesh, further = line_mesh_states(run, line, motion)
         return CleanRecord(
             acceleration=self.rows(run, line, motion),
             shaft_angle=angle,
@@ -384,10 +394,17 @@ class LineMachine(Machine):
             contact_loss_fraction=float(motion.contact_loss[self.mesh_number]),
             integration_error=motion.energy_residual,
             integration_check="energy",
+            mesh=mesh,
+            further_meshes=further,
         )
 
     def _integrate(
-        self, line: RunningLine, duration: float, channels: list[tuple[str, int]]
+        self,
+        line: RunningLine,
+        duration: float,
+        channels: list[tuple[str, int]],
+        *,
+        with_pairs: bool = False,
     ) -> tuple[LineMotion, Array]:
         """Motion of a line, and the angle of the driving gear's shaft, (sample,) rad."""
         shaft = "angle", line.dof(self.driving_node)
@@ -396,6 +413,7 @@ class LineMachine(Machine):
             duration=duration,
             channels=list(dict.fromkeys([*channels, shaft])),
             settling=SETTLING,
+            with_pairs=with_pairs,
         )
         return motion, self.ratio * motion.nominal_angle + motion.signals[shaft]
 
@@ -445,25 +463,16 @@ class LineMachine(Machine):
         return replace(engine, drive=held)
 
     def crank_angle(self, start: Start) -> float:
-        """Angle of the crank in its cycle when given teeth of the mesh are at a phase, rad.
-
-        The driving gear's teeth are tied to the crank: the same tooth meets the same cylinder's
-        firing in every record. Where its shaft turns more than once a cycle, the driven gear's
-        tooth chooses the turn. A motor has no cycle: its turns are counted on, so that the other
-        meshes stand as the teeth allow. A lead-in gives the angle, as much earlier.
-        """
+        """Angle of the crank or the motor at a start, rad; a lead-in gives it, as much earlier."""
         if start.line_angle is not None:
             return start.line_angle
-        pitches = (
-            start.tooth_pinion
-            + start.phase
-            - start_phase(self.engine.drive, self.mesh_number)
+        return driving_angle(
+            self.engine.drive,
+            self.mesh_number,
+            start,
+            ratio=self.ratio,
+            has_cycle=isinstance(self.engine.engine, Engine),
         )
-        turns = pitches / self.pair.pinion.n_teeth
-        if not isinstance(self.engine.engine, Engine):
-            return 2.0 * math.pi * (turns + start.tooth_wheel) / self.ratio
-        turns += start.tooth_wheel % max(1, round(2.0 * self.ratio))
-        return 2.0 * math.pi * turns / self.ratio % (4.0 * math.pi)
 
     def rows(
         self, run: Run[Self], line: RunningLine, motion: LineMotion | LineSignals

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gensig.driveline.drive_line import DriveLine
 from gensig.driveline.linear.shaft_line import GearMesh
 from gensig.geometry.contact import GearPair
+from gensig.systems.run import Start
 
 Array = NDArray[np.float64]
 
@@ -53,6 +54,25 @@ def tooth_angles(line: DriveLine, turned: float = 0.0) -> Array:
             break  # the rest belongs to no part that holds the first node
     angles = [angle or 0.0 for angle in by_node]
     return np.array([angles[gear.node] + turned * ratio[gear.node] for gear in gears])
+
+
+def driving_angle(
+    line: DriveLine, number: int, start: Start, *, ratio: float, has_cycle: bool
+) -> float:
+    """Angle of the crank in its cycle, or of the motor, when given teeth of a mesh are at a phase,
+    rad.
+
+    ``ratio`` is the speed of the driving gear over the crank's. Its teeth are tied to the crank:
+    the same tooth meets the same cylinder's firing in every record. Where its shaft turns more than
+    once a cycle, the driven gear's tooth chooses the turn. A motor has no cycle: its turns are
+    counted on, so that the other meshes stand as the teeth allow.
+    """
+    pitches = start.tooth_pinion + start.phase - start_phase(line, number)
+    turns = pitches / line.pairs[number].pinion.n_teeth
+    if not has_cycle:
+        return 2.0 * math.pi * (turns + start.tooth_wheel) / ratio
+    turns += start.tooth_wheel % max(1, round(2.0 * ratio))
+    return 2.0 * math.pi * turns / ratio % (4.0 * math.pi)
 
 
 def start_rolls(line: DriveLine, turned: float = 0.0) -> Array:

@@ -169,6 +169,7 @@ class RunningLine:
         duration: float,
         channels: Sequence[tuple[str, int]],
         settling: float,
+        with_pairs: bool = False,
     ) -> LineMotion:
         """Motion from the static deflection with the linear vibration on it.
 
@@ -193,6 +194,7 @@ class RunningLine:
                     channels=channels,
                     lead_in=lead,
                     start=start,
+                    with_pairs=with_pairs,
                 )
             except StepError:
                 if 2 * solver.oversampling > MOST_STEPS:

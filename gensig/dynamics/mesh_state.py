@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from gensig.dynamics._layout import N_SEEN, SEEN_FORCE, SEEN_NEWEST, SEEN_PAIRS
 from gensig.dynamics.helical import half_lag, pitches
 from gensig.dynamics.pair import PairDynamics
-from gensig.errors import ConfigError
 
 Array = NDArray[np.float64]
 
@@ -103,17 +102,7 @@ def mesh_signals(
     """Signals of a mesh state with ``n_pairs`` rows of pairs; without values for a failed record.
 
     ``of_mesh`` is what the name of a mesh that records do not follow puts before the names.
-
-    Raises
-    ------
-    ConfigError    for a machine without loads of its teeth: no pairs
     """
-    if n_pairs == 0:
-        raise ConfigError(
-            "dataset.store_mesh_state: the loads of the teeth of a drive line are known with "
-            "solver.backend=nystroem alone; take dataset.store_mesh_state=false, or that backend "
-            "where the line allows it"
-        )
     if mesh is None:
         teeth = np.full((n_pairs, n_samples), NO_TOOTH, dtype=np.int16)
         unknown, no = np.full(n_samples, np.nan), np.zeros(n_samples, dtype=np.bool_)

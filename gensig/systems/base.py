@@ -141,7 +141,7 @@ class Machine(ABC):
     @property
     @abstractmethod
     def most_pairs(self) -> int:
-        """Most tooth pairs whose loads can be recorded at once; 0 where they are not known."""
+        """Most tooth pairs whose loads can be recorded at once."""
 
     @property
     @abstractmethod

@@ -129,9 +129,8 @@ SWITCHES = (
     "sensing.sensor.low_cutoff_hz=1",
     "dataset.store_source=true",
     "modification=tip_relief",
+    "dataset.store_mesh_state=true",
 )
-# Of gear pairs alone.
-PAIR_SWITCHES = ("dataset.store_mesh_state=true",)
 # One switch is on in these of eight runs: every half of them that has the first. Any two switches
 # then meet both on, both off, and either alone (Kleitman & Spencer 1973).
 HALVES = [{0, *others} for others in itertools.combinations(range(1, 8), 3)]
@@ -150,8 +149,8 @@ def covering_rows(switches):
 
 
 def test_covering_rows_hold_every_pair():
-    rows = covering_rows(SWITCHES + PAIR_SWITCHES)
-    for first, second in itertools.combinations(SWITCHES + PAIR_SWITCHES, 2):
+    rows = covering_rows(SWITCHES)
+    for first, second in itertools.combinations(SWITCHES, 2):
         states = {(first in row, second in row) for row in rows}
         assert len(states) == 4, (first, second)
 
@@ -162,9 +161,7 @@ def test_covering_rows_hold_every_pair():
     [(system, option) for system, names in SENSING.items() for option in names],
 )
 def test_sensing_options_run_pairwise(system, sensing, row):
-    is_pair = system.endswith("_pair")
-    switches = SWITCHES + PAIR_SWITCHES if is_pair else SWITCHES
-    words = covering_rows(switches)[row]
+    words = covering_rows(SWITCHES)[row]
     check_runs(f"system={system}", f"sensing={sensing}", *SHORT, *words)
 
 
@@ -222,11 +219,6 @@ REFUSED = [
         "two_stage_gearbox",
         ["sensing.channels=[pinion_y]", "system.lateral=false"],
         "with system.lateral=true",
-    ),
-    (
-        "two_stage_gearbox",
-        ["solver.backend=newmark", "dataset.store_mesh_state=true"],
-        "take dataset.store_mesh_state=false",
     ),
     (
         "two_stage_gearbox",

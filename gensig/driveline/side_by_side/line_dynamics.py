@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.driveline.line_gears import STILL
-from gensig.driveline.running import RunningLine, reference_force
+from gensig.driveline.running import RunningLine
+from gensig.driveline.side_by_side.line_pairs import mesh_pair
 from gensig.driveline.time.mesh_friction import slide_direction
 from gensig.driveline.time.newmark import static_start
 from gensig.dynamics.backends.nystroem._layout import FOLLOWED
@@ -22,11 +22,10 @@ from gensig.dynamics.backends.nystroem.method import (
 from gensig.dynamics.backends.nystroem.stability import stable_rate
 from gensig.dynamics.backends.step_limits import LONGEST_SETTLING, SETTLED
 from gensig.dynamics.integrator import Solver
-from gensig.dynamics.pair import Body, PairDynamics
+from gensig.dynamics.pair import PairDynamics
 from gensig.errors import SimulationError, StepError
 from gensig.mesh.pair_table import PairTable
 from gensig.operation.setpoint import Operating
-from gensig.sensing.manufacturing import GearErrors
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -153,11 +152,10 @@ def line_dynamics(
     operating : options of the set-point; its speed and torque are not read
     angles : numbers of the nodes whose angles are given out
     """
-    speed = float(running.course.speed[0])
     meshes = range(len(running.line.meshes))
     return LineDynamics(
         running=running,
-        pairs=tuple(_pair(running, m, operating, speed) for m in meshes),
+        pairs=tuple(_spur_pair(running, m, operating) for m in meshes),
         touched=np.array([running.touched(m) for m in meshes], dtype=np.int64),
         senses=np.array([running.sense(m) for m in meshes]),
         angles=tuple(running.dof(node) for node in angles),
@@ -199,38 +197,11 @@ def _refuse(pair: PairDynamics) -> None:
         )
 
 
-def _pair(
-    running: RunningLine, m: int, operating: Operating, speed: float
-) -> PairDynamics:
-    """The teeth of a mesh under its mean force, on bodies that are not read."""
-    mesh, tabulated = running.line.meshes[m], running.tabulated.get(m)
+def _spur_pair(running: RunningLine, m: int, operating: Operating) -> PairDynamics:
+    tabulated = running.tabulated.get(m)
     if tabulated is None or not isinstance(tabulated.table, PairTable):
         raise SimulationError(
-            f"solver.backend = nystroem takes meshes of spur teeth, but mesh {mesh.name} has "
-            f"helical ones; {OTHER_BACKEND}"
+            "solver.backend = nystroem takes meshes of spur teeth, but mesh "
+            f"{running.line.meshes[m].name} has helical ones; {OTHER_BACKEND}"
         )
-    table = tabulated.table
-    pair, force = table.pair, float(running.mesh_force[m])
-    force = reference_force(running.machine, m, force)
-    point = replace(
-        operating,
-        speed=speed * float(running.line.rotation[mesh.roll_dof]),
-        torque=force * pair.pinion.base_radius,
-    )
-    n_teeth = pair.pinion.n_teeth, pair.wheel.n_teeth
-    perfect = [GearErrors(error=np.zeros(n), tilt=np.zeros(n)) for n in n_teeth]
-    driving, driven = tabulated.errors or perfect
-    body = Body(mass=1.0, inertia=1.0, support=STILL)
-    return PairDynamics(
-        table=table,
-        pinion=body,
-        wheel=body,
-        operating=point,
-        pinion_error=driving.error,
-        wheel_error=driven.error,
-        pinion_tilt=driving.tilt,
-        wheel_tilt=driven.tilt,
-        start_tooth_pinion=mesh.start_teeth[0],
-        start_tooth_wheel=mesh.start_teeth[1],
-        start_phase=mesh.start_phase,
-    )
+    return mesh_pair(running, m, operating)

@@ -9,20 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.driveline.running import named_by_side
 from gensig.driveline.side_by_side.line_dynamics import (
     LineDynamics,
     check_line,
     line_dynamics,
 )
 from gensig.driveline.side_by_side.line_integration import integrate_lines
-from gensig.driveline.teeth import felt_there
+from gensig.driveline.side_by_side.line_pairs import line_mesh_state
 from gensig.dynamics._layout import N_SEEN
 from gensig.dynamics.backends.base import Integration, Motions
 from gensig.dynamics.backends.nystroem._line_layout import A_TURN
-from gensig.dynamics.mesh_state import MeshState, mesh_state
+from gensig.dynamics.mesh_state import MeshState
 from gensig.errors import SimulationError
-from gensig.faults.base import faulty_teeth
 from gensig.systems.integration_checks import (
     checks,
     finer,
@@ -144,10 +142,7 @@ def _together(
         number, mesh = run.system.mesh_number, None
         further: list[MeshState] = []
         if run.with_mesh_state:
-            further = [
-                _mesh_state(run, line, motions, index, m)
-                for m in range(len(line.pairs))
-            ]
+            further = _mesh_states(run, line, motions, index)
             mesh = further.pop(number)
         records.append(
             CleanRecord(
@@ -164,16 +159,16 @@ def _together(
     return records
 
 
-def _mesh_state(
-    run: LineRun, line: LineDynamics, motions: Motions, index: int, m: int
-) -> MeshState:
-    """Loads of the teeth of mesh ``m`` in one of some motions."""
-    machine, drive = run.system, run.system.engine.drive
-    seen = motions.seen[index][m * N_SEEN : (m + 1) * N_SEEN]
-    angle = motions.angle[index][line.angles.index(line.touched[m, A_TURN])]
-    felt = felt_there(drive, machine.mesh_number, m, run.faults)
-    faulty = faulty_teeth(named_by_side(drive.pairs[m]), felt)
-    return mesh_state(line.pairs[m], seen, angle, faulty)
+def _mesh_states(
+    run: LineRun, line: LineDynamics, motions: Motions, index: int
+) -> list[MeshState]:
+    """Loads of the teeth of all meshes in one of some motions."""
+    states = []
+    for m, pair in enumerate(line.pairs):
+        seen = motions.seen[index][m * N_SEEN : (m + 1) * N_SEEN]
+        angle = motions.angle[index][line.angles.index(line.touched[m, A_TURN])]
+        states.append(line_mesh_state(run, pair, m, seen, angle))
+    return states
 
 
 def _signals(

@@ -13,6 +13,7 @@ import numpy as np
 
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time._layout import COAST, DRIVE, node_offset, spring_column
+from gensig.dynamics._layout import SEEN_FORCE, SEEN_NEWEST, SEEN_PAIRS
 from gensig.dynamics._vector import compiled
 
 MOST_ROUNDS = 60
@@ -190,6 +191,24 @@ def rub(meshes, mesh, law, work):
         law[layout.RUBBING] += force
         law[layout.MOMENT_A] -= force * arm
         law[layout.MOMENT_B] += force * (number[first + layout.TANGENT_LENGTH] - arm)
+
+
+@compiled
+def write_pairs(meshes, turned, law, work, seen):
+    """Write the state of the pairs of all meshes, the newest first, to ``seen`` (mesh, N_SEEN).
+
+    The law of every mesh has just been evaluated where it has rolled ``turned`` (mesh,) pitches.
+    Pairs on the back flanks are not told apart.
+    """
+    for m in range(len(law)):
+        first = meshes.integers[m, layout.FIRST]
+        seen[m, SEEN_NEWEST] = math.floor(turned[m]) - first
+        seen[m, SEEN_FORCE] = law[m, layout.FORCE]
+        for j in range(meshes.integers[m, layout.N_PAIRS]):
+            force = 0.0
+            if law[m, layout.FORCE] > 0.0:
+                force = work.pairs[m, DRIVE, j, layout.PRESSED]
+            seen[m, SEEN_PAIRS + j] = force
 
 
 @compiled

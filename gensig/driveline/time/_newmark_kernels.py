@@ -14,6 +14,7 @@ from gensig.driveline.time._line_mesh_kernels import (
     mesh_law,
     rub,
     solve_contact,
+    write_pairs,
 )
 from gensig.dynamics._tableau import NEWMARK
 from gensig.dynamics._vector import compiled
@@ -250,6 +251,8 @@ def advance(
     n_steps,
     channels,
     out,
+    seen,
+    per_seen,
     tally,
     sums,
     work,
@@ -262,6 +265,7 @@ def advance(
         (mesh,), law (mesh, N_LAW) as ``look`` makes them; all advanced in place
     channels : (channel, 2)    kind and index
     out : (step, column)    takes the channels' means over every step in its first columns
+    seen : (sample, mesh, N_SEEN)    takes the pairs every ``per_seen`` steps from time 0 on
     tally, sums : (mesh, N_TALLY), (N_SUMS,)    are added to
     work : ``Work``
 
@@ -355,6 +359,9 @@ def advance(
                 out[step_index - first_step, c] = 0.5 * (
                     law[i, layout.FORCE] + law_1[i, layout.FORCE]
                 )
+        sample = (step_index + 1) // per_seen
+        if (step_index + 1) % per_seen == 0 and 0 <= sample < len(seen):
+            write_pairs(meshes, turned, law_1, work, seen[sample])
         put_in, lost = 0.0, 0.0
         drag = ahead_v
         drag[:] = 0.0

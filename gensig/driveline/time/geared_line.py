@@ -287,7 +287,7 @@ def _direction(line: GearedLine, order: Index) -> Array:
 
 
 def _rubbing(line: GearedLine, order: Index) -> Array:
-    """Where the friction of every mesh and its moments act, (3 mesh, dof)."""
+    """Directions of the friction of every mesh and of its moments, (3 mesh, dof)."""
     rows = np.zeros((layout.N_RUBBING * len(line.meshes), len(order)))
     for m, mesh in enumerate(line.meshes):
         if mesh.friction is not None:

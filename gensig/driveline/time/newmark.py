@@ -24,6 +24,7 @@ from gensig.driveline.time.geared_line import (
     pack_meshes,
     pack_torques,
 )
+from gensig.dynamics._layout import N_SEEN
 from gensig.dynamics._tableau import NEWMARK
 from gensig.dynamics.decimation import decimator
 from gensig.errors import ConfigError, SimulationError, StepError
@@ -83,6 +84,8 @@ class LineMotion:
         flanks
     largest_force, least_force : (mesh,) N  at the internal rate
     newton_rounds : mean of a step
+    seen : (mesh, row, sample)    state of the pairs, rows of ``gensig.dynamics._layout``; no sample
+        where none was asked for
     end : (2, dof)    deviations and their rates where the integration ended
     """
 
@@ -96,6 +99,7 @@ class LineMotion:
     largest_force: Array
     least_force: Array
     newton_rounds: float
+    seen: Array
     end: Array
 
 
@@ -109,6 +113,7 @@ def integrate_line(
     channels: Sequence[tuple[str, int]],
     lead_in: float = 0.0,
     start: tuple[Array, Array] | None = None,
+    with_pairs: bool = False,
 ) -> LineMotion:
     """Integrate from ``lead_in`` s before time 0 or earlier, and give out ``duration`` s from
     time 0 on.
@@ -118,6 +123,7 @@ def integrate_line(
     channels : ("angle" | "speed" | "acceleration", degree of freedom) or ("mesh_force", mesh)
     start : deviations and their rates, (dof,) each, where the integration begins; None is
         ``static_start``
+    with_pairs : whether the state of the pairs of teeth is told at every sample
 
     The low-pass looks ahead and back: integration begins at least ``decimation.Decimator.margin``
     samples and one before time 0, and ends as many after the last.
@@ -148,6 +154,8 @@ def integrate_line(
         begin = first_sample / solver.sampling_rate
         start = static_start(line, course, torques, time=begin), np.zeros(n)
     run = _Run(line, course, torques, solver, start, channels)
+    if with_pairs:
+        run.seen = np.zeros((n_samples, len(line.meshes), N_SEEN))
     run.begin(first_sample * solver.oversampling)
     run.skip((-low_pass.margin - first_sample) * solver.oversampling - 1)
     signals = run.record(n_samples)
@@ -252,6 +260,7 @@ class _Run:
             if kind != "mesh_force":
                 row[1] = at_of[number]
         self.step_index, self.n_steps, self.energy = 0, 0, 0.0
+        self.seen = np.zeros((0, len(line.meshes), N_SEEN))
 
     def begin(self, step_index: int) -> None:
         """Look at the start, ``step_index`` steps from time 0."""
@@ -277,6 +286,7 @@ class _Run:
         failed = kernels.advance(
             *(self.packed, self.meshes, self.torques, self.course, self.state),
             *(self.solver.step, self.step_index, n_steps, channels, out),
+            *(self.seen, self.solver.oversampling),
             *(self.tally, self.sums, self.work),
         )
         q, v, *_ = self.state
@@ -347,6 +357,7 @@ class _Run:
             largest_force=self.tally[:, layout.LARGEST].copy(),
             least_force=self.tally[:, layout.LEAST].copy(),
             newton_rounds=float(self.sums[layout.ROUNDS]) / self.n_steps,
+            seen=np.moveaxis(self.seen, 0, -1),
             end=np.array([q[at_of], v[at_of]]),
         )
 

@@ -46,6 +46,14 @@ TWO_STAGE = (
 )
 
 
+LOSSLESS = (
+    *TWO_STAGE,
+    "system.loss_factor.shaft=0",
+    "system.loss_factor.coupling=0",
+    "operating.drive_frequency_hz=20",
+)
+
+
 def as_line(pair):
     """A gear pair without rotors as a line of one mesh."""
     system, damping = pair.system(), pair.mesh_damping / pair.mesh_force
@@ -189,13 +197,7 @@ def test_two_stages_agree_with_the_implicit_method(grade):
     They differ in the dampers of the shafts, which have none here, and in where their records
     begin, which a quick governor forgets.
     """
-    words = [
-        *TWO_STAGE,
-        "system.loss_factor.shaft=0",
-        "system.loss_factor.coupling=0",
-        "operating.drive_frequency_hz=20",
-        "sensing.channels=[pinion_x, pinion_y, wheel_y]",
-    ]
+    words = [*LOSSLESS, "sensing.channels=[pinion_x, pinion_y, wheel_y]"]
     if grade is not None:
         words.append(f"quality.iso1328_grade={grade}")
     machine = read_line_machine(read_request(words).config)
@@ -276,6 +278,25 @@ def test_the_loads_of_every_mesh_are_known(two_stage):
     assert abs(entered[1] / entered[0] - passed) < 0.05
     plain = recorded(replace(run, with_mesh_state=False))[0]
     assert plain.acceleration.tobytes() == record.acceleration.tobytes()
+
+
+def test_the_loads_are_the_same_by_the_implicit_method():
+    """Of both meshes: forces, teeth and their shares."""
+    machine = read_line_machine(read_request([*LOSSLESS]).config)
+    slow = with_solver(machine, backend="newmark", oversampling=40)
+    runs = [run_of(each, with_mesh_state=True) for each in (machine, slow)]
+    ours, theirs = recorded(*runs)
+    meshes = zip(
+        (ours.mesh, *ours.further_meshes),
+        (theirs.mesh, *theirs.further_meshes),
+        strict=True,
+    )
+    for found, expected in meshes:
+        off = np.abs(found.force - expected.force)
+        assert off.max() < 0.01 * expected.force.mean()
+        assert np.mean(found.pinion_tooth == expected.pinion_tooth) > 0.995
+        assert np.mean(found.wheel_tooth == expected.wheel_tooth) > 0.995
+        assert np.median(np.abs(found.load_share - expected.load_share)) < 1e-3
 
 
 def test_the_loads_are_the_same_whichever_mesh_is_followed(two_stage):

@@ -80,10 +80,11 @@ SECOND = "idler_gear_2_output_gear"
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_a_line_has_the_loads_of_every_mesh(tmp_path: Path) -> None:
+@pytest.mark.parametrize("backend", ["nystroem", "newmark"])
+def test_a_line_has_the_loads_of_every_mesh(tmp_path: Path, backend: str) -> None:
     """A tooth missing from the output gear is engaged in the second mesh alone."""
     out = tmp_path / "set"
-    run("generate", "--quiet", *LINE, f"out={out}")
+    run("generate", "--quiet", *LINE, f"solver.backend={backend}", f"out={out}")
     run("verify", out)
     run("export", out, "--to", "hdf5", "--out", tmp_path / "out.h5")
     with gensig.open_dataset(out) as data, h5py.File(tmp_path / "out.h5") as exported:
