@@ -19,6 +19,7 @@ from gensig.dynamics._vector import (
     where_above,
     width,
 )
+from gensig.dynamics._written import written
 
 # degrees of freedom of the two gears, first in every machine; helical gears have more after them
 P_X, P_Y, P_TURN, W_X, W_Y, W_TURN, N_IN_PLANE = range(7)
@@ -26,13 +27,13 @@ N_GEARS = 12
 EARLIEST, LATEST = 0.02, 0.98  # share of a step at which it may be cut in two
 
 
-@inlined
+@written
 def dofs_of_gears(group):
     """Degrees of freedom of the two gears, first in every machine."""
     return N_GEARS if is_helical(group) else N_IN_PLANE
 
 
-@inlined
+@written
 def motion(group, q, v, work):
     """Approach and its rate, from the rows of a state."""
     numbers = group.numbers
@@ -138,7 +139,7 @@ def recenter(group, q, n_dof, work, wide):
         set_row(work, q + d, get_row(work, q + d) - turn * get_row(group.rotation, d))
 
 
-@inlined
+@written
 def _earlier_crossing(earliest, before, after, fall, zero, one):
     """The lesser of ``earliest`` and the share of the step at which a number crosses 0.
 

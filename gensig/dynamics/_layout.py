@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from numba.core import types
-from numba.extending import intrinsic
 
-from gensig.dynamics._vector import FOUR, inlined
+from gensig.dynamics._vector import FOUR
+from gensig.dynamics._written import intrinsic, written
 from gensig.mesh.pair_table import N_PAIRS
 
 MOST_PAIRS = 8  # that may be followed at once; spur gears have 4
@@ -231,10 +231,7 @@ class HelicalGroup(Group):
     """
 
 
-_intrinsic: Any = intrinsic
-
-
-@_intrinsic
+@intrinsic
 def is_helical(typing_context: Any, group: Any) -> Any:
     """True for a group of helical gears; a constant of the compiled code."""
     answer = issubclass(group.instance_class, HelicalGroup)
@@ -245,25 +242,25 @@ def is_helical(typing_context: Any, group: Any) -> Any:
     return types.boolean(group), build
 
 
-@inlined
+@written
 def followed(group):
     """Pairs that are followed at once."""
     return group.n_pairs if is_helical(group) else N_PAIRS
 
 
-@inlined
+@written
 def pair_rows(slot, pair):
     """First row of a pair in a slot; ``COMPLIANCE`` to ``POSITION`` count from there."""
     return slot * SLOT_ROWS + pair * N_KEPT
 
 
-@inlined
+@written
 def chord_rows(slot, pair):
     """First row of a pair's chord in a slot; ``LEFT_OUT`` to ``TOUCH_SLOPE`` count from there."""
     return CHORD_DATA + slot * CHORD_SLOT_ROWS + pair * COLUMNS
 
 
-@inlined
+@written
 def raw_index(block, pair, lane, n):
     """Index of the table row that was read for a pair of one record.
 
@@ -272,13 +269,13 @@ def raw_index(block, pair, lane, n):
     return block * n + (pair * n + lane) * COLUMNS
 
 
-@inlined
+@written
 def span_index(slot, n):
     """Index of the spans of a slot; ``FIRST_READ`` to ``LAST_NEAR_PAIR`` count from there."""
     return SPAN * n + N_SPAN * slot
 
 
-@inlined
+@written
 def machine_rows(block, n_dof):
     """First row of a block of the machine; see ``NOW``."""
     return N_MESH + block * n_dof

@@ -40,16 +40,17 @@ from gensig.dynamics._vector import (
     where_above,
     width,
 )
+from gensig.dynamics._written import written
 from gensig.mesh.pair_table import N_PAIRS
 
 
-@inlined
+@written
 def _clip(x, low, high):
     x = where_above(low, x, low, x)
     return where_above(x, high, high, x)
 
 
-@inlined
+@written
 def _sliding(numbers, position):
     """Direction of sliding, smooth through the pitch point, -1 before it and 1 after it."""
     beyond = position - get_row(numbers, layout.PITCH_POINT)
@@ -58,7 +59,7 @@ def _sliding(numbers, position):
     return x * (1.5 - 0.5 * x * x)
 
 
-@inlined
+@written
 def rubbed(numbers, position, load):
     """Friction force of a pair, and its moments about pinion and wheel."""
     coefficient = get_row(numbers, layout.FRICTION)

@@ -48,6 +48,7 @@ from gensig.dynamics._vector import (
     where_above,
     width,
 )
+from gensig.dynamics._written import written
 
 
 @inlined
@@ -161,7 +162,7 @@ def gather(group, slot, renew, work, wide, near):
     return changed
 
 
-@inlined
+@written
 def _bent(group, lane, low, high, part):
     """Table values between two nodes, bent as their slopes say."""
     step = high - low
@@ -199,7 +200,7 @@ def _choose(group, lane, k, p, part, position, work, near):
     return chord != before
 
 
-@inlined
+@written
 def _read_chord(group, lane, k, p, part, work):
     """Read the chord table in the way of the table, ``p`` the index of the cell."""
     low = load_four(group.chord_table, p)
@@ -208,7 +209,7 @@ def _read_chord(group, lane, k, p, part, work):
     store(work, raw, _bent(group, lane, low, high, part))
 
 
-@inlined
+@written
 def _spread_rows(group, block, k, target, position, work):
     """Write what was read lane by lane to four rows from ``target`` on.
 
@@ -250,7 +251,7 @@ def cover(slot, first, last, work, near):
             set_row(work, pair + STIFFNESS, zero)
 
 
-@inlined
+@written
 def _cubic_middle(p, q, m, distance, work):
     """Set value and slope at row ``m`` half-way between rows ``p`` and ``q``, from the cubic.
 

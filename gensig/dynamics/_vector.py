@@ -23,8 +23,10 @@ from numba import njit
 from numba.core import types
 from numba.core.cgutils import get_or_insert_function
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, models, register_model
+from numba.extending import lower_builtin, models, register_model
 from numpy.typing import NDArray
+
+from gensig.dynamics._written import OPERATIONS, intrinsic, written
 
 PRECISIONS = ("float64", "float32")
 GROUP_BYTES = 64
@@ -66,7 +68,6 @@ def _stamped(decorator):
 compiled: Any = _stamped(functools.partial(njit, nogil=True, **OPTIONS)())
 inlined: Any = _stamped(functools.partial(njit, inline="always", **OPTIONS)())
 
-_intrinsic: Any = intrinsic
 _INDEX = ir.IntType(32)
 
 
@@ -155,6 +156,10 @@ def _binary(function, instruction: str) -> None:
                     )
             return getattr(builder, instruction)(*vectors)
 
+        for sig in _Typed.cases:
+            if sig.return_type is kind:
+                OPERATIONS[function, *sig.args] = sig, _build
+
 
 _binary(operator.add, "fadd")
 _binary(operator.sub, "fsub")
@@ -194,13 +199,13 @@ def _storing(vector, array, per_index: int):
     return types.void(array, types.intp, vector), build
 
 
-@_intrinsic
+@intrinsic
 def load_four(typing_context, array, index):
     """Four numbers from ``index`` on."""
     return _loading(ROWS[array.dtype], array, 1)
 
 
-@_intrinsic
+@intrinsic
 def store(typing_context, array, index, value):
     """Write a vector from ``index`` of a one-dimensional array of its kind on."""
     if array.dtype is not value.element:
@@ -208,14 +213,14 @@ def store(typing_context, array, index, value):
     return _storing(value, array, 1)
 
 
-@_intrinsic
+@intrinsic
 def get_row(typing_context, array, row):
     """A row of a flat array: one number for every record of the group."""
     vector = GROUPS[array.dtype]
     return _loading(vector, array, vector.count)
 
 
-@_intrinsic
+@intrinsic
 def set_row(typing_context, array, row, value):
     """Write a row of a flat array."""
     vector = GROUPS[array.dtype]
@@ -224,17 +229,13 @@ def set_row(typing_context, array, row, value):
     return _storing(vector, array, vector.count)
 
 
-@_intrinsic
-def at(typing_context, row, lane, n_lanes):
+@written
+def at(row, lane, n_lanes):
     """Index of one record's number in a flat array: row ``row``, record ``lane``."""
-
-    def build(context, builder, sig, args):
-        return builder.add(builder.mul(args[0], args[2]), args[1])
-
-    return types.intp(types.intp, types.intp, types.intp), build
+    return row * n_lanes + lane
 
 
-@_intrinsic
+@intrinsic
 def width(typing_context, array):
     """Records of a group whose numbers have the array's kind."""
 
@@ -244,7 +245,7 @@ def width(typing_context, array):
     return types.intp(array), build
 
 
-@_intrinsic
+@intrinsic
 def spread(typing_context, array, value):
     """The same number in every lane, of the array's kind."""
 
@@ -254,7 +255,7 @@ def spread(typing_context, array, value):
     return GROUPS[array.dtype](array, types.float64), build
 
 
-@_intrinsic
+@intrinsic
 def where_above(typing_context, a, b, yes, no):
     """``yes`` in the lanes where a > b, ``no`` elsewhere."""
 
@@ -265,7 +266,17 @@ def where_above(typing_context, a, b, yes, no):
     return a(a, a, a, a), build
 
 
-@_intrinsic
+@intrinsic
+def chosen(typing_context, condition, yes, no):
+    """``yes`` in every lane if a condition holds, else ``no``."""
+
+    def build(context, builder, sig, args):
+        return builder.select(*args)
+
+    return yes(types.boolean, yes, yes), build
+
+
+@intrinsic
 def plus_product(typing_context, total, factors, index, value):
     """``total + factors[index] * value``, rounded once.
 
@@ -285,7 +296,7 @@ def plus_product(typing_context, total, factors, index, value):
     return total(total, factors, types.intp, total), build
 
 
-@_intrinsic
+@intrinsic
 def fused(typing_context, a, b, total):
     """``a * b + total``, rounded once; a scalar stands for the same number in every lane."""
     arguments = a, b, total
@@ -305,7 +316,7 @@ def fused(typing_context, a, b, total):
     return kind(*kinds), build
 
 
-@_intrinsic
+@intrinsic
 def any_above(typing_context, a, b):
     """True if a > b in any lane."""
 
@@ -317,7 +328,7 @@ def any_above(typing_context, a, b):
     return types.boolean(a, a), build
 
 
-@_intrinsic
+@intrinsic
 def transpose(typing_context, a, b, c, d):
     """Four rows of four as four columns."""
 
@@ -334,7 +345,7 @@ def transpose(typing_context, a, b, c, d):
     return types.UniTuple(a, FOUR)(a, a, a, a), build
 
 
-@_intrinsic
+@intrinsic
 def second_and_fourth(typing_context, row):
     """(b, b, d, d) of a row (a, b, c, d)."""
 
@@ -354,7 +365,7 @@ def _eight_of(element, llvm_number):
     return ir.VectorType(llvm_number, EIGHT), element.bitwidth // 8
 
 
-@_intrinsic
+@intrinsic
 def load_wide(typing_context, array, index):
     """Eight numbers from ``index`` on, in float64."""
     number = array.dtype
@@ -370,13 +381,13 @@ def load_wide(typing_context, array, index):
     return WIDE(array, types.intp), build
 
 
-@_intrinsic
+@intrinsic
 def store_wide(typing_context, array, index, value):
     """Write eight float64 numbers to an array of their kind."""
     return _storing(value, array, 1)
 
 
-@_intrinsic
+@intrinsic
 def truncated(typing_context, value):
     """Every number without its fraction."""
 
@@ -389,13 +400,13 @@ def truncated(typing_context, value):
     return WIDE(WIDE), build
 
 
-@_intrinsic
+@intrinsic
 def lower(typing_context, value):
     """The first eight numbers of a group, in float64."""
     return _part(value, 0)
 
 
-@_intrinsic
+@intrinsic
 def upper(typing_context, value):
     """The last eight numbers of a group, in float64."""
     return _part(value, value.count - EIGHT)
@@ -414,7 +425,7 @@ def _part(kind, first):
     return WIDE(kind), build
 
 
-@_intrinsic
+@intrinsic
 def joined(typing_context, array, low, high):
     """A row of the array's kind from its first and its last eight numbers in float64."""
     kind = GROUPS[array.dtype]
@@ -429,7 +440,7 @@ def joined(typing_context, array, low, high):
     return kind(array, WIDE, WIDE), build
 
 
-@_intrinsic
+@intrinsic
 def cells(typing_context, table, low, high):
     """Eight numbers from one index of a table on for every lane, as eight rows of the group.
 

@@ -10,8 +10,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from gensig.dynamics.bearing_sizes import bearing_for
 from gensig.errors import ConfigError
+from gensig.geometry.bearing_sizes import bearing_for
 from gensig.geometry.contact import SIDES
 from gensig.options.configuration import Section
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gensig.dynamics.bearing_sizes import BearingSize, bearing_for
 from gensig.errors import ConfigError, GensigError
+from gensig.geometry.bearing_sizes import BearingSize, bearing_for
 from gensig.geometry.contact import GearPair
 from gensig.life.root.root_stress import root_factors
 from gensig.options.configuration import Configuration, Section

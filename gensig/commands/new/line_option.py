@@ -23,8 +23,8 @@ from gensig.commands.new.stages import (
     mesh_forces,
     shaft_diameters,
 )
-from gensig.dynamics.bearing_sizes import bearing_for
 from gensig.dynamics.decimation import usable_band
+from gensig.geometry.bearing_sizes import bearing_for
 from gensig.systems.derived_sizes import bearing_values
 
 LINE_RATE = 51200.0  # Hz, of sensing=geared_line_bearings

@@ -27,8 +27,8 @@ from gensig.commands.new.stages import (
     shaft_diameters,
     stage_options,
 )
-from gensig.dynamics.bearing_sizes import bearing_for
 from gensig.errors import ConfigError
+from gensig.geometry.bearing_sizes import bearing_for
 
 GROUPS = ("system", "experiment")
 TABLES = ("shafting", "gears")

@@ -42,7 +42,8 @@ def test_a_change_of_a_called_function_is_noticed(tmp_path: Path) -> None:
     package.mkdir(parents=True)
     for folder in (package, package.parent):
         (folder / "__init__.py").write_text("")
-    shutil.copy(PACKAGE / "dynamics" / "_vector.py", package)
+    for name in ("_vector.py", "_written.py"):
+        shutil.copy(PACKAGE / "dynamics" / name, package)
     (package / "_calling.py").write_text(CALLING)
     paths = {
         "PYTHONPATH": str(tmp_path),

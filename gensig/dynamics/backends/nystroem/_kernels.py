@@ -29,6 +29,7 @@ from gensig.dynamics._vector import (
     where_above,
     width,
 )
+from gensig.dynamics._written import written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._kinks import correct, kinked
 from gensig.dynamics.backends.nystroem._law import mesh_law
@@ -85,13 +86,16 @@ def integrate(
     n_dof = len(group.force) // n
     n_channels = len(channels) if out_row >= 0 else 0
     zero, one = spread(work, 0.0), spread(work, 1.0)
-    q, v = block(rows.Q), block(rows.V)
-    middle_q, middle_v = block(rows.MIDDLE_Q), block(rows.MIDDLE_V)
-    end_q, end_v = block(rows.END_Q), block(rows.END_V)
+    q, v = block(rows.Q, MOST_DOFS), block(rows.V, MOST_DOFS)
+    middle_q, middle_v = (
+        block(rows.MIDDLE_Q, MOST_DOFS),
+        block(rows.MIDDLE_V, MOST_DOFS),
+    )
+    end_q, end_v = block(rows.END_Q, MOST_DOFS), block(rows.END_V, MOST_DOFS)
     now, forces, mean = (
-        block(rows.NOW),
-        block(rows.FORCES),
-        block(rows.MEAN),
+        block(rows.NOW, MOST_DOFS),
+        block(rows.FORCES, MOST_DOFS),
+        block(rows.MEAN, MOST_DOFS),
     )
     radius = get_row(group.numbers, layout.PINION_RADIUS)
     changing = len(group.profile) > layout.N_PROFILE * n
@@ -223,8 +227,8 @@ def start(group, fresh, by_tooth, work, wide):
     """Set what the step remembers in the lanes that are fresh, from one evaluation there."""
     n = width(work)
     n_dof = len(group.force) // n
-    q, v = block(rows.Q), block(rows.V)
-    mean, forces = block(rows.MEAN), block(rows.FORCES)
+    q, v = block(rows.Q, MOST_DOFS), block(rows.V, MOST_DOFS)
+    mean, forces = block(rows.MEAN, MOST_DOFS), block(rows.FORCES, MOST_DOFS)
     zero, radius = spread(work, 0.0), get_row(group.numbers, layout.PINION_RADIUS)
     first_pairs(group, fresh, work, wide)
     for j in range(FOLLOWED):
@@ -254,9 +258,9 @@ def start(group, fresh, by_tooth, work, wide):
     flags = get_row(work, rows.FRESH)
     for d in range(n_dof):
         a = get_row(work, mean + d)
-        choose(flags, block(rows.NOW) + d, a, work)
-        choose(flags, block(rows.HALFWAY) + d, a, work)
-        choose(flags, block(rows.BEFORE) + d, a, work)
+        choose(flags, block(rows.NOW, MOST_DOFS) + d, a, work)
+        choose(flags, block(rows.HALFWAY, MOST_DOFS) + d, a, work)
+        choose(flags, block(rows.BEFORE, MOST_DOFS) + d, a, work)
     choose(flags, rows.NORMAL, law.normal, work)
     for j in range(FOLLOWED):
         margin = get_row(work, rows.MARGIN + rows.END_AT * FOLLOWED + j)
@@ -267,7 +271,7 @@ def start(group, fresh, by_tooth, work, wide):
         set_row(work, rows.PAIR_FORCE + j, force)
 
 
-@inlined
+@written
 def choose(flags, row, value, work):
     """Set a row in the lanes whose flag is above 0."""
     zero = spread(work, 0.0)

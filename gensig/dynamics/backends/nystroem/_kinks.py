@@ -10,6 +10,7 @@ from gensig.dynamics import _layout as layout
 from gensig.dynamics._equations import P_TURN, P_X, P_Y, W_TURN, W_X, W_Y
 from gensig.dynamics._vector import (
     any_above,
+    chosen,
     compiled,
     get_row,
     inlined,
@@ -17,6 +18,7 @@ from gensig.dynamics._vector import (
     spread,
     where_above,
 )
+from gensig.dynamics._written import written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._law import arm
 from gensig.dynamics.backends.nystroem._layout import (
@@ -33,13 +35,13 @@ from gensig.dynamics.backends.nystroem._layout import (
 LEAST_DAMPED = 0.1
 
 
-@inlined
+@written
 def margin(instant, j, work):
     """Margin of a pair at an instant of the step."""
     return get_row(work, MARGIN + instant * FOLLOWED + j)
 
 
-@inlined
+@written
 def kinked(j, work):
     """1 where a pair takes up or releases its load in the step, else 0."""
     return crosses_zero(
@@ -50,7 +52,7 @@ def kinked(j, work):
     )
 
 
-@inlined
+@written
 def crosses_zero(begin, middle, end, work):
     """1 where the sign of a number changes in the step, else 0."""
     zero, one = spread(work, 0.0), spread(work, 1.0)
@@ -59,13 +61,13 @@ def crosses_zero(begin, middle, end, work):
     return where_above(zero, lowest, one, zero)
 
 
-@inlined
+@written
 def _spring(j, work):
     """Stiffness of a pair in the middle of the step."""
     return get_row(work, SPRING + MIDDLE_AT * FOLLOWED + j)
 
 
-@inlined
+@written
 def _others(instant, j, work):
     """Stiffness of the loaded pairs but one."""
     zero, total = spread(work, 0.0), spread(work, 0.0)
@@ -76,7 +78,7 @@ def _others(instant, j, work):
     return total
 
 
-@inlined
+@written
 def _lone_margin(instant, j, shared, work):
     """Margin of a pair; the force it would have if it carried where it does not."""
     zero, force = spread(work, 0.0), margin(instant, j, work)
@@ -87,7 +89,7 @@ def _lone_margin(instant, j, shared, work):
     return where_above(force, zero, force, would)
 
 
-@inlined
+@written
 def _half(a, b, c, low, value_low, value_high, work):
     """Integrals of the positive part of the parabola and of its share of time, over a half."""
     zero = spread(work, 0.0)
@@ -106,22 +108,22 @@ def _half(a, b, c, low, value_low, value_high, work):
     return mean, late
 
 
-@inlined
+@written
 def _moment_0(t, a, slope, bend):
     return t * (a + t * (0.5 * slope + t * (bend * (1.0 / 3.0))))
 
 
-@inlined
+@written
 def _moment_1(t, a, slope, bend):
     return t * t * (0.5 * a + t * (slope * (1.0 / 3.0) + t * (0.25 * bend)))
 
 
-@inlined
+@written
 def _positive(x, zero):
     return where_above(x, zero, x, zero)
 
 
-@inlined
+@written
 def _missed(j, changed, shared, work):
     """Set what Simpson's rule misses of the force of a pair; 0 where it has no kink."""
     zero = spread(work, 0.0)
@@ -135,7 +137,7 @@ def _missed(j, changed, shared, work):
     )
 
 
-@inlined
+@written
 def missed_moments(a, b, c, work):
     """Moments that Simpson's rule misses of the positive part of a parabola through three values.
 
@@ -151,7 +153,7 @@ def missed_moments(a, b, c, work):
     return short, early
 
 
-@inlined
+@written
 def _give(j, changed, shared, work):
     """Add what Simpson's rule misses of a pair's force; the other loaded pairs give way."""
     zero = spread(work, 0.0)
@@ -184,12 +186,15 @@ def miss(numbers, changed, work):
     for j in range(FOLLOWED):
         set_row(work, rows.SHORT + j, zero)
         set_row(work, rows.EARLY + j, zero)
-    for j in range(FOLLOWED):
-        if any_above(changed[j], zero):
-            _give(j, changed[j], shared, work)
+    if any_above(changed[0], zero):
+        _give(0, changed[0], shared, work)
+    if any_above(changed[1], zero):
+        _give(1, changed[1], shared, work)
+    if any_above(changed[2], zero):
+        _give(2, changed[2], shared, work)
 
 
-@inlined
+@written
 def missed_law(group, forces, work):
     """The law of pair forces in the middle of the step, of which nothing is damped or stored."""
     numbers = group.numbers
@@ -201,8 +206,7 @@ def missed_law(group, forces, work):
         normal, rubbed = normal + force, rubbed + slid
         turned = turned + slid * arm(numbers, get_row(work, pair + rows.PLACE))
         along = along + force * get_row(work, pair + rows.GAP_SLOPE)
-    if not group.consistent:
-        along = zero
+    along = chosen(group.consistent, along, zero)
     coefficient = get_row(numbers, layout.FRICTION)
     friction, moment = coefficient * rubbed, coefficient * turned
     moment_w = get_row(numbers, layout.TANGENT_LENGTH) * friction - moment
@@ -222,14 +226,14 @@ def correct(group, h, changed, mean, v, q, work):
     _push(group, rows.EARLY, h * h, any_changed, q, work)
 
 
-@inlined
+@written
 def _push(group, forces, by, changed, target, work):
     """Add accelerations by pair forces, times a number, to rows of the plane motions."""
     law = missed_law(group, forces, work)
     push_gears(group, law, by, changed, target, work)
 
 
-@inlined
+@written
 def push_gears(group, law, by, changed, target, work):
     """Add accelerations by a law, times a number, to rows of the plane motions."""
     numbers = group.numbers
@@ -245,7 +249,7 @@ def push_gears(group, law, by, changed, target, work):
     add_force(group, W_TURN, on_w, by, changed, target, work)
 
 
-@inlined
+@written
 def add_force(group, d, force, by, changed, target, work):
     """Add the acceleration of a degree of freedom by a force, times a number, to a row."""
     zero, old = spread(work, 0.0), get_row(work, target + d)

@@ -10,6 +10,7 @@ from gensig.dynamics._mesh_kernels import coast_law
 from gensig.dynamics._vector import (
     any_above,
     at,
+    chosen,
     fused,
     get_row,
     inlined,
@@ -18,16 +19,19 @@ from gensig.dynamics._vector import (
     where_above,
     width,
 )
+from gensig.dynamics._written import written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._layout import N_NODE, PER_COMPLIANCE
 
+N_FORCES = 5  # numbers of a law before its energies
 
-@inlined
+
+@written
 def _greater(a, b):
     return where_above(a, b, a, b)
 
 
-@inlined
+@written
 def _bite(nodes, j, ahead, approach, work):
     """Penetration of a pair into the body that no other pair deflects; negative without."""
     pair = nodes + j * N_NODE
@@ -35,7 +39,7 @@ def _bite(nodes, j, ahead, approach, work):
     return approach - fused(ahead, rise, gap)
 
 
-@inlined
+@written
 def shared_load(c_0, c_1, c_2, b_0, b_1, b_2, shared, zero):
     """Load of three pairs that share a compliance, and their own stiffnesses.
 
@@ -72,7 +76,7 @@ def shared_load(c_0, c_1, c_2, b_0, b_1, b_2, shared, zero):
     return _greater(load, zero), springs
 
 
-@inlined
+@written
 def arm(numbers, place):
     """Radius of curvature of the pinion's flank at a place on the path."""
     path, zero = get_row(numbers, layout.PATH), spread(numbers, 0.0)
@@ -81,7 +85,7 @@ def arm(numbers, place):
     return get_row(numbers, layout.START_CURVATURE) + on_path
 
 
-@inlined
+@written
 def _pair(numbers, nodes, instant, j, bite, spring, bent, rate, roll_rate, work):
     """Force, friction over its coefficient, its moment about the pinion, force along the roll."""
     zero, one = spread(numbers, 0.0), spread(numbers, 1.0)
@@ -118,10 +122,39 @@ def mesh_law(
     ``ahead`` m after the nodes and ``turned`` m after the begin of the step. Rows of the
     instant take margin, stiffness and damping of every pair.
     """
+    law = drive_law(group, nodes, instant, ahead, approach, rate, roll_rate, work)
+    if any_above(0.0 - get_row(group.numbers, layout.BACKLASH), approach):
+        set_contact(law, turned, approach, rate, roll_rate, work)
+        _coast(group, work, wide)
+        law = law_with_coast(work)
+    return law
+
+
+@written
+def set_contact(law, turned, approach, rate, roll_rate, work):
+    """Set the rows from which the law of the back flanks is added to that of the drive flanks."""
+    for row in range(N_FORCES):
+        set_row(work, layout.LAW + row, law[row])
+    set_row(work, layout.MOTION_ROLL, turned)
+    set_row(work, layout.MOTION_APPROACH, approach)
+    set_row(work, layout.MOTION_RATE, rate)
+    set_row(work, layout.MOTION_ROLL_RATE, roll_rate)
+
+
+@written
+def law_with_coast(work):
+    """The law of both flanks, without its energies."""
+    zero = spread(work, 0.0)
+    forces = (get_row(work, layout.LAW + row) for row in range(N_FORCES))
+    return layout.Law._make((*forces, zero, zero, zero))
+
+
+@written
+def drive_law(group, nodes, instant, ahead, approach, rate, roll_rate, work):
+    """The law of the drive flanks; see ``mesh_law``."""
     numbers = group.numbers
     zero = spread(work, 0.0)
     scaled = PER_COMPLIANCE * get_row(numbers, layout.SHARED)
-    play = get_row(numbers, layout.BACKLASH)
     b_0 = _bite(nodes, 0, ahead, approach, work)
     b_1 = _bite(nodes, 1, ahead, approach, work)
     b_2 = _bite(nodes, 2, ahead, approach, work)
@@ -149,24 +182,7 @@ def mesh_law(
     normal, friction = (f_0 + f_1) + f_2, coefficient * ((s_0 + s_1) + s_2)
     moment_p = 0.0 - coefficient * ((m_0 + m_1) + m_2)
     moment_w = get_row(numbers, layout.TANGENT_LENGTH) * friction + moment_p
-    along = (a_0 + a_1) + a_2
-    if not group.consistent:
-        along = zero
-    if any_above(0.0 - play, approach):
-        set_row(work, layout.LAW, normal)
-        set_row(work, layout.LAW + 1, friction)
-        set_row(work, layout.LAW + 2, moment_p)
-        set_row(work, layout.LAW + 3, moment_w)
-        set_row(work, layout.LAW + 4, along)
-        set_row(work, layout.MOTION_ROLL, turned)
-        set_row(work, layout.MOTION_APPROACH, approach)
-        set_row(work, layout.MOTION_RATE, rate)
-        set_row(work, layout.MOTION_ROLL_RATE, roll_rate)
-        _coast(group, work, wide)
-        normal, friction = get_row(work, layout.LAW), get_row(work, layout.LAW + 1)
-        moment_p = get_row(work, layout.LAW + 2)
-        moment_w = get_row(work, layout.LAW + 3)
-        along = get_row(work, layout.LAW + 4)
+    along = chosen(group.consistent, (a_0 + a_1) + a_2, zero)
     return layout.Law(normal, friction, moment_p, moment_w, along, zero, zero, zero)
 
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._layout import Group, HelicalGroup, is_helical
-from gensig.dynamics._vector import inlined, n_lanes
+from gensig.dynamics._vector import n_lanes
+from gensig.dynamics._written import written
 
 # N/m: rows hold compliances times this number, which are about 1
 PER_COMPLIANCE = 2.0**27
@@ -85,14 +86,14 @@ class HelicalNystroemGroup(HelicalGroup):
     """Helical gears, for the two-evaluation core."""
 
 
-@inlined
+@written
 def most_dofs(group):
     """Rows of a block of the machine; a constant of the compiled code."""
     return MOST_HELICAL_DOFS if is_helical(group) else MOST_DOFS
 
 
-@inlined
-def block(name, n_dofs=MOST_DOFS):
+@written
+def block(name, n_dofs):
     """First row of a block of the machine, in blocks of so many rows."""
     return N_FIXED + name * n_dofs
 

@@ -15,14 +15,13 @@ from gensig.dynamics import _layout as layout
 from gensig.dynamics._equations import (
     N_IN_PLANE,
     P_TURN,
-    P_X,
     P_Y,
     W_TURN,
-    W_X,
     W_Y,
     dofs_of_gears,
 )
 from gensig.dynamics._vector import fused, get_row, inlined, set_row, spread
+from gensig.dynamics._written import written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._layout import block, most_dofs
 
@@ -33,7 +32,7 @@ Q_NOW, Q_HALFWAY, Q_BEFORE = 19.0 / 96.0, -10.0 / 96.0, 3.0 / 96.0
 V_NOW, V_HALFWAY, V_BEFORE = 23.0 / 24.0, -16.0 / 24.0, 5.0 / 24.0
 
 
-@inlined
+@written
 def mobility(group):
     """Acceleration of the approach by a force of the mesh, 1/kg."""
     numbers, mass = group.numbers, group.inverse_mass
@@ -58,57 +57,94 @@ def go_to_middle(step, n_dof, n_rows, work):
     middle_q, middle_v = block(rows.MIDDLE_Q, n_rows), block(rows.MIDDLE_V, n_rows)
     now, before = block(rows.NOW, n_rows), block(rows.BEFORE, n_rows)
     halfway = block(rows.HALFWAY, n_rows)
+    rows_of = q, v, middle_q, middle_v, now, before, halfway
     for d in range(n_dof):
-        a, last_m = get_row(work, now + d), get_row(work, halfway + d)
-        last_a, rate = get_row(work, before + d), get_row(work, v + d)
-        moved = fused(Q_BEFORE, last_a, fused(Q_HALFWAY, last_m, Q_NOW * a))
-        moved = fused(step, moved, 0.5 * rate)
-        set_row(work, middle_q + d, fused(step, moved, get_row(work, q + d)))
-        gained = fused(V_BEFORE, last_a, fused(V_HALFWAY, last_m, V_NOW * a))
-        set_row(work, middle_v + d, fused(step, gained, rate))
+        _to_middle(d, step, rows_of, work)
+
+
+@written
+def _to_middle(d, step, rows_of, work):
+    q, v, middle_q, middle_v, now, before, halfway = rows_of
+    a, last_m = get_row(work, now + d), get_row(work, halfway + d)
+    last_a, rate = get_row(work, before + d), get_row(work, v + d)
+    moved = fused(Q_BEFORE, last_a, fused(Q_HALFWAY, last_m, Q_NOW * a))
+    moved = fused(step, moved, 0.5 * rate)
+    set_row(work, middle_q + d, fused(step, moved, get_row(work, q + d)))
+    gained = fused(V_BEFORE, last_a, fused(V_HALFWAY, last_m, V_NOW * a))
+    set_row(work, middle_v + d, fused(step, gained, rate))
 
 
 @inlined
 def go_to_end(group, law, torque, step, n_dof, work):
     """Set the accelerations in the middle and the predicted state at the end of the step."""
-    on_x, on_y, on_p, on_w = _on_gears(group, law, torque)
-    _predict(group, P_X, on_x, step, work)
-    _predict(group, P_Y, on_y, step, work)
-    _predict(group, P_TURN, on_p, step, work)
-    _predict(group, W_X, 0.0 - on_x, step, work)
-    _predict(group, W_Y, 0.0 - on_y, step, work)
-    _predict(group, W_TURN, on_w, step, work)
-    n_gears = dofs_of_gears(group)
-    for d in range(N_IN_PLANE, n_gears):
-        _predict(group, d, _along_axes(group, d, on_y), step, work)
-    for d in range(n_gears, n_dof):
-        _predict(group, d, spread(work, 0.0), step, work)
+    if len(group.other_column) > 0:
+        set_loads(group, law, torque, n_dof, work)
+        for d in range(n_dof):
+            m = _loaded_acceleration(group, d, rows.MIDDLE_Q, rows.MIDDLE_V, work)
+            predict(d, m, step, most_dofs(group), work)
+    else:
+        _predict_gears(group, law, torque, step, work)
+        for d in range(dofs_of_gears(group), n_dof):
+            _predict(group, d, spread(work, 0.0), step, work)
 
 
 @inlined
 def finish(group, law, torque, step, n_dof, work):
     """Set accelerations and state at the end of the step, and the mean accelerations."""
+    if len(group.other_column) > 0:
+        set_loads(group, law, torque, n_dof, work)
+        for d in range(n_dof):
+            b = _loaded_acceleration(group, d, rows.END_Q, rows.END_V, work)
+            conclude(d, b, step, most_dofs(group), work)
+    else:
+        _conclude_gears(group, law, torque, step, work)
+        for d in range(dofs_of_gears(group), n_dof):
+            _conclude(group, d, spread(work, 0.0), step, work)
+
+
+@written
+def _predict_gears(group, law, torque, step, work):
+    for d, load in enumerate(_loads(group, law, torque)):
+        _predict(group, d, load, step, work)
+
+
+@written
+def _conclude_gears(group, law, torque, step, work):
+    for d, load in enumerate(_loads(group, law, torque)):
+        _conclude(group, d, load, step, work)
+
+
+@written
+def _loads(group, law, torque):
+    """Forces of the mesh on the motions of both gears."""
     on_x, on_y, on_p, on_w = _on_gears(group, law, torque)
-    _conclude(group, P_X, on_x, step, work)
-    _conclude(group, P_Y, on_y, step, work)
-    _conclude(group, P_TURN, on_p, step, work)
-    _conclude(group, W_X, 0.0 - on_x, step, work)
-    _conclude(group, W_Y, 0.0 - on_y, step, work)
-    _conclude(group, W_TURN, on_w, step, work)
-    n_gears = dofs_of_gears(group)
-    for d in range(N_IN_PLANE, n_gears):
-        _conclude(group, d, _along_axes(group, d, on_y), step, work)
-    for d in range(n_gears, n_dof):
-        _conclude(group, d, spread(work, 0.0), step, work)
+    axes = range(N_IN_PLANE, dofs_of_gears(group))
+    along = [_along_axes(group, d, on_y) for d in axes]
+    return on_x, on_y, on_p, 0.0 - on_x, 0.0 - on_y, on_w, *along
 
 
 @inlined
+def set_loads(group, law, torque, n_dof, work):
+    """Set the rows of the mean accelerations, which follow later, to the forces of the mesh."""
+    first = block(rows.MEAN, most_dofs(group))
+    _set_loads(group, law, torque, first, work)
+    for d in range(dofs_of_gears(group), n_dof):
+        set_row(work, first + d, spread(work, 0.0))
+
+
+@written
+def _set_loads(group, law, torque, first, work):
+    for d, load in enumerate(_loads(group, law, torque)):
+        set_row(work, first + d, load)
+
+
+@written
 def _along_axes(group, d, normal):
     """Force of the mesh on a motion of helical gears out of their plane."""
     return 0.0 - get_row(group.reach, d) * normal
 
 
-@inlined
+@written
 def _on_gears(group, law, torque):
     """Forces of the mesh on the pinion's x, y and rotation, and on the wheel's rotation."""
     numbers = group.numbers
@@ -119,40 +155,50 @@ def _on_gears(group, law, torque):
     return law.friction, normal, on_p, arm_w * normal + law.moment_w
 
 
-@inlined
-def acceleration(group, d, on_it, q, v, forces, work):
-    """Acceleration of a degree of freedom under a force of the mesh, with states in rows."""
+@written
+def _pull(group, d, on_it, q, v, forces, work):
+    """Force on a degree of freedom without those of its neighbours, with states in rows."""
     spring = get_row(group.stiffness, d) * get_row(work, q + d)
     spring = fused(get_row(group.damping, d), get_row(work, v + d), spring)
-    pull = get_row(work, forces + d) + (on_it - spring)
-    if len(group.other_column) > 0:
-        for k in range(group.other_first[d], group.other_first[d + 1]):
-            other = group.other_column[k]
-            moved, rate = get_row(work, q + other), get_row(work, v + other)
-            pull = pull - get_row(group.other_stiffness, k) * moved
-            pull = pull - get_row(group.other_damping, k) * rate
+    return get_row(work, forces + d) + (on_it - spring)
+
+
+@inlined
+def _loaded_acceleration(group, d, states, rates, work):
+    """Acceleration of a degree of freedom under what ``set_loads`` has set and its neighbours."""
+    n_rows = most_dofs(group)
+    q, v = block(states, n_rows), block(rates, n_rows)
+    load = get_row(work, block(rows.MEAN, n_rows) + d)
+    pull = _pull(group, d, load, q, v, block(rows.FORCES, n_rows), work)
+    for k in range(group.other_first[d], group.other_first[d + 1]):
+        pull = _with_neighbour(group, k, group.other_column[k], pull, q, v, work)
     return pull * get_row(group.inverse_mass, d)
 
 
-@inlined
+@written
+def _with_neighbour(group, k, other, pull, q, v, work):
+    moved, rate = get_row(work, q + other), get_row(work, v + other)
+    pull = pull - get_row(group.other_stiffness, k) * moved
+    return pull - get_row(group.other_damping, k) * rate
+
+
+@written
 def _predict(group, d, on_it, step, work):
     n_rows = most_dofs(group)
     q, v = block(rows.MIDDLE_Q, n_rows), block(rows.MIDDLE_V, n_rows)
-    forces = block(rows.FORCES, n_rows)
-    m = acceleration(group, d, on_it, q, v, forces, work)
-    predict(d, m, step, n_rows, work)
+    pull = _pull(group, d, on_it, q, v, block(rows.FORCES, n_rows), work)
+    predict(d, pull * get_row(group.inverse_mass, d), step, n_rows, work)
 
 
-@inlined
+@written
 def _conclude(group, d, on_it, step, work):
     n_rows = most_dofs(group)
     q, v = block(rows.END_Q, n_rows), block(rows.END_V, n_rows)
-    forces = block(rows.FORCES, n_rows)
-    b = acceleration(group, d, on_it, q, v, forces, work)
-    conclude(d, b, step, n_rows, work)
+    pull = _pull(group, d, on_it, q, v, block(rows.FORCES, n_rows), work)
+    conclude(d, pull * get_row(group.inverse_mass, d), step, n_rows, work)
 
 
-@inlined
+@written
 def predict(d, m, step, n_rows, work):
     """Keep the acceleration in the middle, and predict the end, of one degree of freedom."""
     halfway = block(rows.HALFWAY, n_rows) + d
@@ -167,7 +213,7 @@ def predict(d, m, step, n_rows, work):
     set_row(work, block(rows.END_V, n_rows) + d, fused(step * SIXTH, gained, rate))
 
 
-@inlined
+@written
 def conclude(d, b, step, n_rows, work):
     """Keep the acceleration at the end, and set state and mean acceleration, of one degree."""
     end_q = block(rows.END_Q, n_rows)

@@ -26,6 +26,7 @@ from gensig.dynamics._vector import (
     where_above,
     width,
 )
+from gensig.dynamics._written import written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._layout import FOLLOWED, N_NODE, PER_COMPLIANCE
 
@@ -126,7 +127,7 @@ def first_pairs(group, fresh, work, wide):
             work[at(rows.BEHIND, lane, n)] = 0.0
 
 
-@inlined
+@written
 def _between_nodes(low, high, slope_low, slope_high, part, bend):
     """Value and slope in a cell: slopes are straight, values are their integral."""
     step = slope_high - slope_low
@@ -134,7 +135,7 @@ def _between_nodes(low, high, slope_low, slope_high, part, bend):
     return value, fused(part, step, slope_low)
 
 
-@inlined
+@written
 def _find(group, j, ahead, first, wide, n):
     """Place of a pair, share of its table cell, and the cell, of eight lanes from one on."""
     zero = spread(wide, 0.0)
@@ -147,37 +148,46 @@ def _find(group, j, ahead, first, wide, n):
     return place, x - cell, cell
 
 
-@inlined
+@written
 def _index(cell, at_row, per_row, first, wide, n):
     """Index of a cell in the table, of eight lanes from one on."""
     index = cell * load_wide(wide, at(per_row, first, n))
     return index + load_wide(wide, at(at_row, first, n))
 
 
-@inlined
-def _read(group, by_tooth, j, ahead, work, wide):
-    """Own compliance, its slope, gap, its slope, and place of a pair ``ahead`` of the step."""
-    n, numbers = width(work), group.numbers
+@written
+def _find_all(group, j, ahead, work, wide):
+    """Place of a pair and share of its table cell, and the cells of both halves of the lanes."""
+    n = width(work)
     place, part, cell = _find(group, j, lower(ahead), 0, wide, n)
-    low = _index(cell, rows.AT_PINION + j, rows.PER_CELL + j, 0, wide, n)
-    high, last_place, last_part, last_cell = low, place, part, cell
+    last_place, last_part, last_cell = place, part, cell
     if n > EIGHT:
         last_place, last_part, last_cell = _find(group, j, upper(ahead), EIGHT, wide, n)
-        high = _index(last_cell, rows.AT_PINION + j, rows.PER_CELL + j, EIGHT, wide, n)
-    c_0, soft_0, g_0, rise_0, c_1, soft_1, g_1, rise_1 = cells(group.table, low, high)
-    if by_tooth:
-        low = _index(cell, rows.AT_WHEEL + j, rows.PER_WHEEL_CELL + j, 0, wide, n)
-        high = low
-        if n > EIGHT:
-            high = _index(
-                last_cell, rows.AT_WHEEL + j, rows.PER_WHEEL_CELL + j, EIGHT, wide, n
-            )
-        more = cells(group.table, low, high)
-        c_0, c_1 = c_0 + more[0], c_1 + more[4]
-        soft_0, soft_1 = soft_0 + more[1], soft_1 + more[5]
-        g_0, g_1 = g_0 + more[2], g_1 + more[6]
-        rise_0, rise_1 = rise_0 + more[3], rise_1 + more[7]
     part, place = joined(work, part, last_part), joined(work, place, last_place)
+    return place, part, cell, last_cell
+
+
+@written
+def _read_cells(group, at_row, per_row, cell, last_cell, work, wide):
+    """Numbers of two nodes of the table."""
+    n = width(work)
+    low = _index(cell, at_row, per_row, 0, wide, n)
+    high = low
+    if n > EIGHT:
+        high = _index(last_cell, at_row, per_row, EIGHT, wide, n)
+    return cells(group.table, low, high)
+
+
+@written
+def _sums(some, more):
+    return tuple(a + b for a, b in zip(some, more, strict=True))
+
+
+@written
+def _in_cell(group, j, place, part, nodes, work):
+    """Own compliance, its slope, gap and its slope of a pair, from the nodes of its cell."""
+    numbers = group.numbers
+    c_0, soft_0, g_0, rise_0, c_1, soft_1, g_1, rise_1 = nodes
     bend = part * (1.0 - part) * get_row(work, rows.BEND)
     c, soft = _between_nodes(c_0, c_1, soft_0, soft_1, part, bend)
     g, rise = _between_nodes(g_0, g_1, rise_0, rise_1, part, bend)
@@ -185,10 +195,23 @@ def _read(group, by_tooth, j, ahead, work, wide):
     beyond = place - get_row(numbers, layout.MIDDLE_POINT)
     g = fused(tilt, beyond, g + get_row(work, layout.ERROR + j))
     c = PER_COMPLIANCE * (c - get_row(numbers, layout.SHARED))
-    return c, PER_COMPLIANCE * soft, g, rise + tilt, place
+    return c, PER_COMPLIANCE * soft, g, rise + tilt
 
 
 @inlined
+def _read(group, by_tooth, j, ahead, work, wide):
+    """Place of a pair ``ahead`` of the step, share of its cell, and the nodes of the cell."""
+    place, part, cell, last_cell = _find_all(group, j, ahead, work, wide)
+    at_row, per_row = rows.AT_PINION + j, rows.PER_CELL + j
+    nodes = _read_cells(group, at_row, per_row, cell, last_cell, work, wide)
+    if by_tooth:
+        at_row, per_row = rows.AT_WHEEL + j, rows.PER_WHEEL_CELL + j
+        more = _read_cells(group, at_row, per_row, cell, last_cell, work, wide)
+        nodes = _sums(nodes, more)
+    return place, part, nodes
+
+
+@written
 def sliding(numbers, place):
     """Friction coefficient times direction of sliding, and the integral of the direction.
 
@@ -206,7 +229,7 @@ def sliding(numbers, place):
     return x * (1.5 - 0.5 * square), integral
 
 
-@inlined
+@written
 def _set_fresh(row, value, work):
     """Set a row in the lanes that ``FRESH`` marks."""
     fresh, zero = get_row(work, rows.FRESH), spread(work, 0.0)
@@ -217,7 +240,13 @@ def _set_fresh(row, value, work):
 def read_begin(group, by_tooth, j, work, wide):
     """Read a pair at the begin of the step, in the lanes that ``FRESH`` marks."""
     behind = get_row(work, rows.BEHIND)
-    c, soft, gap, rise, place = _read(group, by_tooth, j, behind, work, wide)
+    place, part, nodes = _read(group, by_tooth, j, behind, work, wide)
+    _set_begin(group, j, place, part, nodes, work)
+
+
+@written
+def _set_begin(group, j, place, part, nodes, work):
+    c, soft, gap, rise = _in_cell(group, j, place, part, nodes, work)
     direction, slid = sliding(group.numbers, place)
     node = rows.NODES + j * N_NODE
     _set_fresh(node + rows.COMPLIANCE, c, work)
@@ -229,7 +258,7 @@ def read_begin(group, by_tooth, j, work, wide):
     _set_fresh(node + rows.SLID, slid, work)
 
 
-@inlined
+@written
 def _cubic(before, after, slope_before, slope_after, span, per_span):
     """Value and slope half-way; Simpson's rule over the slopes gives the growth."""
     growth = (CUBIC_MIDDLE.slope_by_values * per_span) * (after - before)
@@ -245,8 +274,14 @@ def read_step(group, by_tooth, j, ahead, span, per_span, work, wide):
     No gap is smaller in the middle than at both ends. Sliding in the middle is such that
     Simpson's rule gives its mean over the step.
     """
+    place, part, nodes = _read(group, by_tooth, j, ahead, work, wide)
+    _set_step(group, j, place, part, nodes, span, per_span, work)
+
+
+@written
+def _set_step(group, j, place, part, nodes, span, per_span, work):
     node, middle = rows.NODES + j * N_NODE, rows.MIDDLE + j * N_NODE
-    c, soft, gap, rise, place = _read(group, by_tooth, j, ahead, work, wide)
+    c, soft, gap, rise = _in_cell(group, j, place, part, nodes, work)
     direction, slid = sliding(group.numbers, place)
     c_0, soft_0 = (
         get_row(work, node + rows.COMPLIANCE),
