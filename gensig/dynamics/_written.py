@@ -35,14 +35,14 @@ for _operation in (operator.add, operator.sub, operator.mul):
 
 
 class Code:
-    """Where instructions are written."""
+    """Place in a function at which instructions are written."""
 
     def __init__(self, context, typing_context, builder) -> None:
         self.context, self.typing_context = context, typing_context
         self.builder = builder
 
     def value(self, kind, llvm):
-        """What Python calculates with: a number that is known, a tuple of values, or a value."""
+        """A number that is known, a tuple of values, or a ``Value``: Python calculates with it."""
         if isinstance(kind, types.Literal):
             return kind.literal_value
         if isinstance(kind, types.UniTuple):
