@@ -32,6 +32,7 @@ from gensig.dynamics._layout import (
 from gensig.dynamics._vector import (
     any_above,
     at,
+    chosen,
     compiled,
     get_row,
     inlined,
@@ -70,6 +71,33 @@ def rubbed(numbers, position, load):
     return force, 0.0 - force * arm, force * arm_w
 
 
+@written
+def _touch(k, slot, ahead, approach, work):
+    """Set the bite of a pair; its penetration, negative where it does not touch."""
+    zero, pair = spread(work, 0.0), pair_rows(slot, k)
+    grown = ahead * get_row(work, pair + GAP_SLOPE)
+    bite = approach - (get_row(work, pair + GAP) + grown)
+    set_row(work, BITE + k, where_above(bite, zero, bite, zero))
+    return bite
+
+
+@written
+def _add_load(k, slot, stiffness, force, work):
+    """Add a pair to the stiffness and the force of all that touch."""
+    zero, bite = spread(work, 0.0), get_row(work, BITE + k)
+    of_pair = get_row(work, pair_rows(slot, k) + STIFFNESS)
+    return stiffness + where_above(bite, zero, of_pair, zero), force + bite * of_pair
+
+
+@written
+def _lift(k, bent, lifted, work):
+    """Take the bite of a pair that the shared deflection lifts off; the sum of such bites."""
+    bite = get_row(work, BITE + k)
+    kept = where_above(bite, bent, bite, spread(work, 0.0))
+    set_row(work, BITE + k, kept)
+    return lifted + (bite - kept)
+
+
 @inlined
 def _total_load(numbers, rounds, first, last, slot, work):
     """Load of all pairs, and the sum of their stiffnesses.
@@ -82,17 +110,11 @@ def _total_load(numbers, rounds, first, last, slot, work):
     for _ in range(rounds):
         stiffness, force = zero, zero
         for k in range(first, last):
-            bite = get_row(work, BITE + k)
-            of_pair = get_row(work, pair_rows(slot, k) + STIFFNESS)
-            stiffness = stiffness + where_above(bite, zero, of_pair, zero)
-            force = force + bite * of_pair
+            stiffness, force = _add_load(k, slot, stiffness, force, work)
         total = force / (1.0 + shared * stiffness)
         lifted = zero
         for k in range(first, last):
-            bite = get_row(work, BITE + k)
-            kept = where_above(bite, shared * total, bite, zero)
-            lifted = lifted + (bite - kept)
-            set_row(work, BITE + k, kept)
+            lifted = _lift(k, shared * total, lifted, work)
         if not any_above(lifted, zero):
             break
     return total, stiffness
@@ -107,20 +129,103 @@ def _followed_damping(damping, elastic, work):
     return damping
 
 
+@written
+def _set_alone(numbers, k, slot, margin, total, stiffness, work):
+    """Set a pair's margin to its penetration into what the others deflect."""
+    zero, shared = spread(work, 0.0), get_row(numbers, SHARED)
+    bite = get_row(work, BITE + k)
+    spring = get_row(work, pair_rows(slot, k) + STIFFNESS)
+    others = stiffness - where_above(bite, zero, spring, zero)
+    deep = get_row(work, margin + k) - shared * total
+    alone = deep * ((1.0 + shared * stiffness) / (1.0 + shared * others))
+    set_row(work, margin + k, where_above(bite, zero, alone, deep))
+
+
+@written
+def _elastic_force(numbers, k, slot, total, work):
+    """Force of a pair's spring, negative where it does not touch."""
+    bent = get_row(numbers, SHARED) * total
+    spring = get_row(work, pair_rows(slot, k) + STIFFNESS)
+    return (get_row(work, BITE + k) - bent) * spring
+
+
+@written
+def _damped_slope(group, k, slot, work):
+    """Slope of the gap that the damping of a pair follows."""
+    if is_helical(group):
+        return get_row(work, chord_rows(slot, k) + layout.TOUCH_SLOPE)
+    return get_row(work, pair_rows(slot, k) + GAP_SLOPE)
+
+
+@written
+def _touching_force(numbers, k, slot, total, work):
+    """Force of a pair's spring, 0 where it does not touch."""
+    zero, elastic = spread(work, 0.0), _elastic_force(numbers, k, slot, total, work)
+    return where_above(get_row(work, BITE + k), zero, elastic, zero)
+
+
+@written
+def _with_pair(group, law, k, slot, elastic, damped, rate, ahead, work):
+    """The law with what a pair adds, and the force of the pair."""
+    zero, one = spread(work, 0.0), spread(work, 1.0)
+    pair, bite, numbers = pair_rows(slot, k), get_row(work, BITE + k), group.numbers
+    force = elastic * damped
+    force = where_above(force, zero, force, zero)
+    compliance = get_row(work, pair + COMPLIANCE)
+    softening = 0.5 * elastic * elastic * get_row(work, pair + COMPLIANCE_SLOPE)
+    slope, middle = get_row(work, pair + GAP_SLOPE), ahead
+    if is_helical(group):
+        middle = ahead - get_row(numbers, layout.HALF_LAG)
+    position = get_row(work, pair + POSITION) + middle
+    sliding, moment, reaction = rubbed(numbers, position, force)
+    sums = Law(
+        law.normal + force,
+        law.friction + sliding,
+        law.moment_p + moment,
+        law.moment_w + reaction,
+        law.along + force * slope + softening,
+        law.stored + elastic * (bite - 0.5 * compliance * elastic),
+        law.lost + (force - elastic) * rate,
+        law.loaded + where_above(force, zero, one, zero),
+    )
+    return sums, force
+
+
+@written
+def _with_chord(group, law, k, slot, elastic, followed, rate, ahead, work):
+    """The law with what the spring of a pair's chord leaves out."""
+    zero, bite = spread(work, 0.0), get_row(work, BITE + k)
+    pair, chord = pair_rows(slot, k), chord_rows(slot, k)
+    slope = get_row(work, chord + layout.LEFT_OUT_SLOPE)
+    left_out = get_row(work, chord + layout.LEFT_OUT) + ahead * slope
+    force = elastic * (1.0 + followed * rate)
+    damped = where_above(force, zero, force, zero) - elastic
+    beyond = _damped_slope(group, k, slot, work) - get_row(work, pair + GAP_SLOPE)
+    turned = damped * beyond - slope
+    return law._replace(
+        stored=law.stored + where_above(bite, zero, left_out, zero),
+        along=law.along + where_above(bite, zero, turned, zero),
+    )
+
+
+@written
+def _of_shared(numbers, total, work):
+    """The law without pairs: the energy that the shared deflection takes from theirs."""
+    zero = spread(work, 0.0)
+    stored = 0.0 - 0.5 * get_row(numbers, SHARED) * total * total
+    return Law(zero, zero, zero, zero, zero, stored, zero, zero)
+
+
+@written
+def _consistent(group, law, work):
+    """The law, without a force on the roll where the roll's torque leaves it out."""
+    along = chosen(group.consistent, law.along, spread(work, 0.0))
+    return law._replace(along=along)
+
+
 @inlined
 def one_sided_law(
-    numbers,
-    consistent,
-    helical,
-    first,
-    last,
-    slot,
-    margin,
-    ahead,
-    approach,
-    approach_rate,
-    roll_rate,
-    work,
+    group, first, last, slot, margin, ahead, approach, approach_rate, roll_rate, work
 ):
     """One-sided contact of the gathered pairs, ``ahead`` m of roll after their reading.
 
@@ -129,73 +234,58 @@ def one_sided_law(
     The damping of helical teeth follows the gap of their first touch, because the gaps of chords
     jump from one to the next. The energy that the springs of chords leave out is stored too.
     """
-    zero, one = spread(work, 0.0), spread(work, 1.0)
-    shared, damping = get_row(numbers, SHARED), get_row(numbers, layout.DAMPING)
-    middle = ahead
-    if helical:
-        middle = ahead - get_row(numbers, layout.HALF_LAG)
+    numbers = group.numbers
+    damping = get_row(numbers, layout.DAMPING)
     for k in range(first, last):
-        pair = pair_rows(slot, k)
-        grown = ahead * get_row(work, pair + GAP_SLOPE)
-        bite = approach - (get_row(work, pair + GAP) + grown)
+        bite = _touch(k, slot, ahead, approach, work)
         if margin >= 0:
             set_row(work, margin + k, bite)
-        set_row(work, BITE + k, where_above(bite, zero, bite, zero))
-    rounds = MOST_PAIRS if helical else N_PAIRS
+    rounds = MOST_PAIRS if is_helical(group) else N_PAIRS
     total, stiffness = _total_load(numbers, rounds, first, last, slot, work)
-    normal, along, lost, loaded = zero, zero, zero, zero
-    friction, moment_p, moment_w = zero, zero, zero
-    stored = 0.0 - 0.5 * shared * total * total
+    law = _of_shared(numbers, total, work)
     for k in range(first, last):
-        pair = pair_rows(slot, k)
-        bite, spring = get_row(work, BITE + k), get_row(work, pair + STIFFNESS)
         if margin >= 0:
-            others = stiffness - where_above(bite, zero, spring, zero)
-            deep = get_row(work, margin + k) - shared * total
-            alone = deep * ((1.0 + shared * stiffness) / (1.0 + shared * others))
-            set_row(work, margin + k, where_above(bite, zero, alone, deep))
-        slope = get_row(work, pair + GAP_SLOPE)
-        elastic = where_above(bite, zero, (bite - shared * total) * spring, zero)
-        damped_slope = slope
-        if helical:
-            damped_slope = get_row(work, chord_rows(slot, k) + layout.TOUCH_SLOPE)
-        rate = approach_rate - damped_slope * roll_rate
+            _set_alone(numbers, k, slot, margin, total, stiffness, work)
+        elastic = _touching_force(numbers, k, slot, total, work)
+        rate = approach_rate - _damped_slope(group, k, slot, work) * roll_rate
         damped = 1.0 + _followed_damping(damping, elastic, work) * rate
-        force = elastic * damped
-        force = where_above(force, zero, force, zero)
+        law, force = _with_pair(group, law, k, slot, elastic, damped, rate, ahead, work)
         if margin >= 0:
             set_row(work, PAIR_FORCE + k, force)
             set_row(work, layout.PAIR_DAMPED + k, damped)
-        normal = normal + force
-        loaded = loaded + where_above(force, zero, one, zero)
-        compliance = get_row(work, pair + COMPLIANCE)
-        stored = stored + elastic * (bite - 0.5 * compliance * elastic)
-        lost = lost + (force - elastic) * rate
-        softening = 0.5 * elastic * elastic * get_row(work, pair + COMPLIANCE_SLOPE)
-        along = along + force * slope + softening
-        position = get_row(work, pair + POSITION) + middle
-        sliding, moment, reaction = rubbed(numbers, position, force)
-        friction, moment_p = friction + sliding, moment_p + moment
-        moment_w = moment_w + reaction
-    if helical:
+    if is_helical(group):
         set_row(work, layout.TOTAL, total)
         for k in range(first, last):
-            pair, chord = pair_rows(slot, k), chord_rows(slot, k)
-            bite = get_row(work, BITE + k)
-            slope = get_row(work, chord + layout.LEFT_OUT_SLOPE)
-            left_out = get_row(work, chord + layout.LEFT_OUT) + ahead * slope
-            elastic = (bite - shared * total) * get_row(work, pair + STIFFNESS)
-            damped_slope = get_row(work, chord + layout.TOUCH_SLOPE)
-            rate = approach_rate - damped_slope * roll_rate
+            elastic = _elastic_force(numbers, k, slot, total, work)
+            rate = approach_rate - _damped_slope(group, k, slot, work) * roll_rate
             followed = _followed_damping(damping, elastic, work)
-            force = elastic * (1.0 + followed * rate)
-            damped = where_above(force, zero, force, zero) - elastic
-            turned = damped * (damped_slope - get_row(work, pair + GAP_SLOPE)) - slope
-            stored = stored + where_above(bite, zero, left_out, zero)
-            along = along + where_above(bite, zero, turned, zero)
-    if not consistent:
-        along = zero
-    return Law(normal, friction, moment_p, moment_w, along, stored, lost, loaded)
+            law = _with_chord(group, law, k, slot, elastic, followed, rate, ahead, work)
+    return _consistent(group, law, work)
+
+
+@written
+def _share(numbers, k, slot, ahead, work):
+    """Share of a pair in contact under the paper's law; below 0 and above 1 far from its ends."""
+    half_lag = get_row(numbers, layout.HALF_LAG)
+    path = get_row(numbers, layout.PATH) + 2.0 * half_lag
+    pair = pair_rows(slot, k)
+    position = get_row(work, pair + POSITION) + ahead
+    inside = where_above(position, path - position, path - position, position)
+    share = 0.5 * (1.0 + inside * get_row(numbers, layout.PER_SWITCH_WIDTH))
+    spring = get_row(work, pair + STIFFNESS)
+    return where_above(spring, spread(work, 1e-20), share, spread(work, -1.0))
+
+
+@written
+def _add_share(k, slot, share, stiffness, loaded, work):
+    """Set a pair's part of the stiffness, and add it and the number of loaded pairs."""
+    zero, one = spread(work, 0.0), spread(work, 1.0)
+    share = _clip(share, zero, one)
+    entered = where_above(share, zero, one, zero)
+    of_pair = share * get_row(work, pair_rows(slot, k) + STIFFNESS)
+    set_row(work, BITE + k, of_pair)
+    loaded = loaded + entered + where_above(one, share, zero, one)
+    return stiffness + of_pair, loaded
 
 
 @inlined
@@ -210,25 +300,12 @@ def papers_law(
     zero, one = spread(work, 0.0), spread(work, 1.0)
     shared, damping = get_row(numbers, SHARED), get_row(numbers, layout.DAMPING)
     half_lag = get_row(numbers, layout.HALF_LAG)
-    per_width = get_row(numbers, layout.PER_SWITCH_WIDTH)
-    path = get_row(numbers, layout.PATH) + 2.0 * half_lag
-    least, absent = spread(work, 1e-20), spread(work, -1.0)
     stiffness, loaded = zero, zero
     for k in range(first, last):
-        pair = pair_rows(slot, k)
-        position = get_row(work, pair + POSITION) + ahead
-        spring = get_row(work, pair + STIFFNESS)
-        inside = where_above(position, path - position, path - position, position)
-        share = 0.5 * (1.0 + inside * per_width)
-        share = where_above(spring, least, share, absent)
+        share = _share(numbers, k, slot, ahead, work)
         if margin >= 0:
             set_row(work, margin + k, share)
-        share = _clip(share, zero, one)
-        entered = where_above(share, zero, one, zero)
-        loaded = loaded + entered + where_above(one, share, zero, one)
-        of_pair = share * spring
-        set_row(work, BITE + k, of_pair)
-        stiffness = stiffness + of_pair
+        stiffness, loaded = _add_share(k, slot, share, stiffness, loaded, work)
     together = stiffness / (1.0 + shared * stiffness)
     normal = together * approach + damping * approach_rate
     divisor = where_above(stiffness, zero, stiffness, one)
@@ -344,9 +421,7 @@ def mesh_law(
     ahead = turned - get_row(work, layout.AHEAD + slot)
     if group.one_sided:
         law = one_sided_law(
-            numbers,
-            group.consistent,
-            is_helical(group),
+            group,
             first,
             last,
             slot,
@@ -357,29 +432,39 @@ def mesh_law(
             roll_rate,
             work,
         )
-        if any_above(0.0 - get_row(numbers, BACKLASH), approach):
-            for row in range(N_LAW):
-                set_row(work, LAW + row, law[row])
-            set_row(work, layout.MOTION_ROLL, turned)
-            set_row(work, layout.MOTION_APPROACH, approach)
-            set_row(work, layout.MOTION_RATE, rate)
-            set_row(work, layout.MOTION_ROLL_RATE, roll_rate)
-            for lane in range(width(work)):
-                coast = work[at(layout.MOTION_APPROACH, lane, width(work))]
-                if coast < -numbers[at(BACKLASH, lane, width(work))]:
-                    coast_law(group, lane, work, wide)
-            law = Law(
-                get_row(work, LAW),
-                get_row(work, LAW + 1),
-                get_row(work, LAW + 2),
-                get_row(work, LAW + 3),
-                get_row(work, LAW + 4),
-                get_row(work, LAW + 5),
-                get_row(work, LAW + 6),
-                get_row(work, LAW + 7),
-            )
+        law = with_coast(group, law, turned, approach, rate, roll_rate, work, wide)
     else:
         law = papers_law(
             numbers, first, last, slot, margin, ahead, approach, rate, work
         )
     return law
+
+
+@inlined
+def with_coast(group, law, turned, approach, rate, roll_rate, work, wide):
+    """The law of the drive flanks with that of the back flanks, in the lanes that touch there."""
+    n, numbers = width(work), group.numbers
+    if any_above(0.0 - get_row(numbers, BACKLASH), approach):
+        _set_contact(law, turned, approach, rate, roll_rate, work)
+        for lane in range(n):
+            coast = work[at(layout.MOTION_APPROACH, lane, n)]
+            if coast < -numbers[at(BACKLASH, lane, n)]:
+                coast_law(group, lane, work, wide)
+        law = _set_law(work)
+    return law
+
+
+@written
+def _set_contact(law, turned, approach, rate, roll_rate, work):
+    """Set the rows that ``coast_law`` reads and adds to."""
+    for row, value in enumerate(law):
+        set_row(work, LAW + row, value)
+    set_row(work, layout.MOTION_ROLL, turned)
+    set_row(work, layout.MOTION_APPROACH, approach)
+    set_row(work, layout.MOTION_RATE, rate)
+    set_row(work, layout.MOTION_ROLL_RATE, roll_rate)
+
+
+@written
+def _set_law(work):
+    return Law._make(get_row(work, LAW + row) for row in range(N_LAW))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba.extending import overload
+from numba.core import types
+from numba.core.typing.templates import AbstractTemplate, infer_global
 
 from gensig.dynamics._vector import (
-    OPTIONS,
     at,
     compiled,
     get_row,
@@ -23,7 +23,7 @@ TOGETHER = 4  # samples of the low-pass that are summed side by side; divides BL
 # the time is half.
 LOW_PASS_PRECISION = "float32"
 
-_overload: Any = overload
+_CORES: dict[Any, Any] = {}  # by the type of the group that they advance
 
 
 def integrate(group, *arguments):
@@ -33,14 +33,19 @@ def integrate(group, *arguments):
 
 def integrates(function, *kinds):
     """Let a compiled function advance the groups of some types."""
+    _CORES.update(dict.fromkeys(kinds, types.Dispatcher(function)))
 
-    def choose(group, *arguments):
-        if group.instance_class not in kinds:
-            return None
-        return lambda group, *arguments: function(group, *arguments)
 
-    # its own cache would not notice changes of ``function``; that of the caller does
-    _overload(integrate, jit_options={**OPTIONS, "cache": False})(choose)
+@infer_global(integrate)
+class _OfGroup(AbstractTemplate):  # type: ignore[misc]
+    """Compiled functions call the core of the group's type itself."""
+
+    def generic(self, args, kws):
+        core = _CORES[args[0].instance_class]
+        return self.context.resolve_function_type(core, args, kws)
+
+    def get_impl_key(self, sig):
+        return _CORES[sig.args[0].instance_class].get_impl_key(sig)
 
 
 @compiled

@@ -60,9 +60,20 @@ def _stamped(decorator):
         dispatcher = decorator(function)
         if hasattr(dispatcher, "_cache"):  # not where NUMBA_DISABLE_JIT is set
             dispatcher._cache._cache_file._source_stamp = _STAMP
+            _compile_once(dispatcher)
         return dispatcher
 
     return decorate
+
+
+def _compile_once(dispatcher) -> None:
+    """Let callers whose numbers are known share the code of those whose numbers are not."""
+    template = dispatcher.get_call_template
+
+    def of_unknown(kinds, named):
+        return template(tuple(map(types.unliteral, kinds)), named)
+
+    dispatcher.get_call_template = of_unknown
 
 
 compiled: Any = _stamped(functools.partial(njit, nogil=True, **OPTIONS)())
@@ -379,12 +390,6 @@ def load_wide(typing_context, array, index):
         return builder.fpext(values, WIDE.llvm)
 
     return WIDE(array, types.intp), build
-
-
-@intrinsic
-def store_wide(typing_context, array, index, value):
-    """Write eight float64 numbers to an array of their kind."""
-    return _storing(value, array, 1)
 
 
 @intrinsic

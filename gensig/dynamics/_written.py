@@ -18,6 +18,7 @@ from numba.core import types
 from numba.core.extending import _Intrinsic
 from numba.core.registry import cpu_target
 
+NUMBERS = {bool: types.boolean, int: types.intp, float: types.float64}
 # signature and code of each operation on two numbers; ``_vector`` adds those of its vectors
 OPERATIONS: dict[Any, Any] = {}
 
@@ -69,7 +70,7 @@ class Code:
             if hasattr(value, "_fields"):
                 kind = types.BaseNamedTuple.from_types(kinds, type(value))
             return kind, self.context.make_tuple(self.builder, kind, parts)
-        kind = types.intp if isinstance(value, int) else types.float64
+        kind = NUMBERS[type(value)]
         return kind, self.context.get_constant(kind, value)
 
     def write(self, definition, values):

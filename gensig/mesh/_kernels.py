@@ -34,9 +34,17 @@ def lower_envelope(standing_back, arc, center, relative_radius, gap):
     n_profile = arc.shape[0]
     for i in range(standing_back.shape[0]):
         back = standing_back[i]
-        lowest = back.min()
+        lowest = np.inf
+        for j in range(n_profile):
+            lowest = min(lowest, back[j])
         for k in range(center.shape[0]):
-            middle = np.searchsorted(arc, center[k])
+            middle, end = 0, n_profile  # the first node from the contact on
+            while middle < end:
+                half = (middle + end) // 2
+                if arc[half] < center[k]:
+                    middle = half + 1
+                else:
+                    end = half
             least = np.inf
             for direction in (1, -1):
                 j = middle if direction == 1 else middle - 1

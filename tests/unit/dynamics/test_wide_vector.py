@@ -16,7 +16,7 @@ from gensig.dynamics._vector import (
     lower,
     n_lanes,
     set_row,
-    store_wide,
+    store,
     truncated,
     upper,
 )
@@ -29,15 +29,15 @@ COMPILED = njit(error_model="numpy")
 def halves(row, wide, result):
     """Both halves of a row to float64, and half of them back to a row."""
     low, high = lower(get_row(row, 0)), upper(get_row(row, 0))
-    store_wide(wide, 0, low)
-    store_wide(wide, EIGHT, high)
+    store(wide, 0, low)
+    store(wide, EIGHT, high)
     set_row(result, 0, joined(result, 0.5 * low, 0.5 * high))
 
 
 @COMPILED
 def cut(values, result):
     """Eight numbers without their fractions."""
-    store_wide(result, 0, truncated(load_wide(values, 0)))
+    store(result, 0, truncated(load_wide(values, 0)))
 
 
 @COMPILED

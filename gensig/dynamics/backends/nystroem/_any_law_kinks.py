@@ -14,6 +14,7 @@ from gensig.dynamics._mesh_kernels import rubbed
 from gensig.dynamics._vector import (
     any_above,
     at,
+    chosen,
     compiled,
     get_row,
     inlined,
@@ -22,6 +23,7 @@ from gensig.dynamics._vector import (
     where_above,
     width,
 )
+from gensig.dynamics._written import written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._kinks import (
     LEAST_DAMPED,
@@ -42,18 +44,18 @@ from gensig.dynamics.backends.nystroem._layout import (
 from gensig.dynamics.backends.nystroem._pairs import OUT_OF_MESH
 
 
-@inlined
+@written
 def margin_row(instant, k):
     """Row of the margin of a pair at an instant of the step."""
     return ANY_MARGIN + instant * MOST_PAIRS + k
 
 
-@inlined
+@written
 def _margin(instant, k, work):
     return get_row(work, margin_row(instant, k))
 
 
-@inlined
+@written
 def _spring(slot, k, work):
     """Own stiffness of a pair at the instant of a slot."""
     return get_row(work, pair_rows(slot, k) + layout.STIFFNESS)
@@ -70,22 +72,33 @@ def keep_margins(group, instant, first, last, slot, work):
         for k in range(first, last):
             set_row(work, margin_row(instant, k), get_row(work, layout.MARGIN + k))
         return
-    shared, carrying = get_row(group.numbers, layout.SHARED), zero
+    carrying = zero
     for k in range(first, last):
-        deep, spring = get_row(work, layout.MARGIN + k), _spring(slot, k, work)
-        carrying = carrying + where_above(deep, zero, spring, zero)
+        carrying = carrying + _carrying(slot, k, work)
     for k in range(first, last):
-        deep, spring = get_row(work, layout.MARGIN + k), _spring(slot, k, work)
-        others = carrying - where_above(deep, zero, spring, zero)
-        lone = 1.0 + shared * others
-        damped = get_row(work, layout.PAIR_DAMPED + k)
-        damped = where_above(damped, zero, damped, zero)
-        force = deep * spring * (lone / (lone + shared * spring))
-        set_row(work, margin_row(instant, k), force * damped)
-        if instant == MIDDLE_AT:
-            least = spread(work, LEAST_DAMPED)
-            damped = where_above(damped, least, damped, least)
-            set_row(work, ANY_DAMPED + k, damped)
+        _keep_margin(group.numbers, instant, k, slot, carrying, work)
+
+
+@written
+def _carrying(slot, k, work):
+    """Stiffness of a pair, 0 where it does not touch."""
+    zero, deep = spread(work, 0.0), get_row(work, layout.MARGIN + k)
+    return where_above(deep, zero, _spring(slot, k, work), zero)
+
+
+@written
+def _keep_margin(numbers, instant, k, slot, carrying, work):
+    zero, shared = spread(work, 0.0), get_row(numbers, layout.SHARED)
+    deep, spring = get_row(work, layout.MARGIN + k), _spring(slot, k, work)
+    lone = 1.0 + shared * (carrying - _carrying(slot, k, work))
+    damped = get_row(work, layout.PAIR_DAMPED + k)
+    damped = where_above(damped, zero, damped, zero)
+    force = deep * spring * (lone / (lone + shared * spring))
+    set_row(work, margin_row(instant, k), force * damped)
+    if instant == MIDDLE_AT:
+        least = spread(work, LEAST_DAMPED)
+        damped = where_above(damped, least, damped, least)
+        set_row(work, ANY_DAMPED + k, damped)
 
 
 @inlined
@@ -122,27 +135,41 @@ def count_anew(group, work, near):
 @inlined
 def kinked(group, k, work):
     """1 where a pair takes up or releases its load in the step, else 0."""
-    begin, middle = _margin(BEGIN_AT, k, work), _margin(MIDDLE_AT, k, work)
-    end = _margin(END_AT, k, work)
-    changed = crosses_zero(begin, middle, end, work)
+    changed = _crosses(0.0, k, work)
     if not group.one_sided:
-        changed = changed + crosses_zero(begin - 1.0, middle - 1.0, end - 1.0, work)
+        changed = changed + _crosses(1.0, k, work)
     return changed
+
+
+@written
+def _crosses(bound, k, work):
+    """1 where the margin of a pair passes a bound in the step, else 0."""
+    return crosses_zero(*_margins_above(bound, k, work), work)
+
+
+@written
+def _margins_above(bound, k, work):
+    """Margins of a pair at begin, middle and end of the step, less a bound."""
+    instants = BEGIN_AT, MIDDLE_AT, END_AT
+    return tuple(_margin(instant, k, work) - bound for instant in instants)
+
+
+@written
+def _missed_above(bound, k, work):
+    return missed_moments(*_margins_above(bound, k, work), work)
 
 
 @inlined
 def _missed(group, k, work):
     """The moments of the margin's part that counts which Simpson's rule misses."""
-    begin, middle = _margin(BEGIN_AT, k, work), _margin(MIDDLE_AT, k, work)
-    end = _margin(END_AT, k, work)
-    short, early = missed_moments(begin, middle, end, work)
+    short, early = _missed_above(0.0, k, work)
     if not group.one_sided:
-        over, over_early = missed_moments(begin - 1.0, middle - 1.0, end - 1.0, work)
+        over, over_early = _missed_above(1.0, k, work)
         short, early = short - over, early - over_early
     return short, early
 
 
-@inlined
+@written
 def _add(k, part, short, early, changed, work):
     """Add a part of what is missed to the corrections of a pair."""
     zero = spread(work, 0.0)
@@ -167,23 +194,33 @@ def _give(group, j, changed, first, last, work):
     given = shared / ((1.0 + shared * others) * get_row(work, ANY_DAMPED + j))
     for i in range(first, last):
         if i != j:
-            part = given * _spring(MIDDLE, i, work) * get_row(work, ANY_DAMPED + i)
-            loaded = _margin(MIDDLE_AT, i, work)
-            part = where_above(loaded, zero, 0.0 - part, zero)
-            _add(i, part, short, early, changed, work)
+            _give_way(i, given, short, early, changed, work)
+
+
+@written
+def _give_way(i, given, short, early, changed, work):
+    zero, loaded = spread(work, 0.0), _margin(MIDDLE_AT, i, work)
+    part = given * _spring(MIDDLE, i, work) * get_row(work, ANY_DAMPED + i)
+    part = where_above(loaded, zero, 0.0 - part, zero)
+    _add(i, part, short, early, changed, work)
+
+
+@written
+def _shared_part(numbers, i, work):
+    """Shared compliance times the stiffness of a pair in the middle of the step."""
+    zero, one = spread(work, 0.0), spread(work, 1.0)
+    share = _margin(MIDDLE_AT, i, work)
+    share = where_above(share, zero, share, zero)
+    share = where_above(share, one, one, share)
+    return share * (get_row(numbers, layout.SHARED) * _spring(MIDDLE, i, work))
 
 
 @inlined
 def _switch(group, j, changed, approach, first, last, work):
     """Correct the force of a pair under the paper's law, whose share of contact is missed."""
-    zero, one = spread(work, 0.0), spread(work, 1.0)
-    together = one
+    together = spread(work, 1.0)
     for i in range(first, last):
-        share = _margin(MIDDLE_AT, i, work)
-        share = where_above(share, zero, share, zero)
-        share = where_above(share, one, one, share)
-        spring = get_row(group.numbers, layout.SHARED) * _spring(MIDDLE, i, work)
-        together = together + share * spring
+        together = together + _shared_part(group.numbers, i, work)
     per_share = _spring(MIDDLE, j, work) * approach / (together * together)
     short, early = _missed(group, j, work)
     _add(j, per_share, short, early, changed, work)
@@ -217,6 +254,11 @@ def correct(group, h, approach, first, last, mean, v, q, work):
 def _push(group, forces, first, last, by, changed, target, work):
     """Add accelerations by pair forces, times a number, to rows of the motions of the gears."""
     law = _missed_law(group, forces, first, last, work)
+    _push_gears(group, law, by, changed, target, work)
+
+
+@written
+def _push_gears(group, law, by, changed, target, work):
     push_gears(group, law, by, changed, target, work)
     for d in range(N_IN_PLANE, dofs_of_gears(group)):
         along = 0.0 - get_row(group.reach, d) * law.normal
@@ -226,18 +268,27 @@ def _push(group, forces, first, last, by, changed, target, work):
 @inlined
 def _missed_law(group, forces, first, last, work):
     """The law of pair forces in the middle of the step, of which nothing is damped or stored."""
-    numbers, zero = group.numbers, spread(work, 0.0)
-    normal, along = zero, zero
-    friction, moment_p, moment_w = zero, zero, zero
+    zero = spread(work, 0.0)
+    law = layout.Law(zero, zero, zero, zero, zero, zero, zero, zero)
     for k in range(first, last):
-        force, pair = get_row(work, forces + k), pair_rows(MIDDLE, k)
-        normal = normal + force
-        position = get_row(work, pair + layout.POSITION)
-        position = position - get_row(numbers, layout.HALF_LAG)
-        sliding, moment, reaction = rubbed(numbers, position, force)
-        friction, moment_p = friction + sliding, moment_p + moment
-        moment_w = moment_w + reaction
-        along = along + force * get_row(work, pair + layout.GAP_SLOPE)
-    if not (group.consistent and group.one_sided):
-        along = zero
-    return layout.Law(normal, friction, moment_p, moment_w, along, zero, zero, zero)
+        law = _with_missed(group, law, k, forces, work)
+    return law
+
+
+@written
+def _with_missed(group, law, k, forces, work):
+    numbers, pair = group.numbers, pair_rows(MIDDLE, k)
+    force, slope = get_row(work, forces + k), get_row(work, pair + layout.GAP_SLOPE)
+    position = get_row(work, pair + layout.POSITION)
+    position = position - get_row(numbers, layout.HALF_LAG)
+    sliding, moment, reaction = rubbed(numbers, position, force)
+    along = law.along + force * slope
+    for condition in (group.consistent, group.one_sided):
+        along = chosen(condition, along, spread(work, 0.0))
+    return law._replace(
+        normal=law.normal + force,
+        friction=law.friction + sliding,
+        moment_p=law.moment_p + moment,
+        moment_w=law.moment_w + reaction,
+        along=along,
+    )

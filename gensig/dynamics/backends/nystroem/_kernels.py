@@ -25,7 +25,7 @@ from gensig.dynamics._vector import (
     load_wide,
     set_row,
     spread,
-    store_wide,
+    store,
     where_above,
     width,
 )
@@ -215,11 +215,11 @@ def set_roll(group, time, q, work, wide):
     for first in range(0, n, EIGHT):
         speed = load_wide(group.profile, at(layout.NOMINAL_SPEED, first, n))
         turned = time * speed + load_wide(wide, at(layout.CENTER, first, n))
-        store_wide(wide, at(layout.NOMINAL, first, n), turned)
+        store(wide, at(layout.NOMINAL, first, n), turned)
         turned = turned + load_wide(work, at(q + P_TURN, first, n))
         roll = load_wide(exact, at(layout.EXACT_RADIUS, first, n)) * turned
         roll = load_wide(exact, at(layout.START_ROLL, first, n)) + roll
-        store_wide(wide, at(layout.BASE, first, n), roll)
+        store(wide, at(layout.BASE, first, n), roll)
 
 
 @compiled

@@ -6,10 +6,8 @@ The symbols are those of ``docs/theory/spur_dynamics.md``.
 from __future__ import annotations
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._mesh_kernels import coast_law
+from gensig.dynamics._mesh_kernels import with_coast
 from gensig.dynamics._vector import (
-    any_above,
-    at,
     chosen,
     fused,
     get_row,
@@ -17,13 +15,10 @@ from gensig.dynamics._vector import (
     set_row,
     spread,
     where_above,
-    width,
 )
 from gensig.dynamics._written import written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._layout import N_NODE, PER_COMPLIANCE
-
-N_FORCES = 5  # numbers of a law before its energies
 
 
 @written
@@ -123,30 +118,7 @@ def mesh_law(
     instant take margin, stiffness and damping of every pair.
     """
     law = drive_law(group, nodes, instant, ahead, approach, rate, roll_rate, work)
-    if any_above(0.0 - get_row(group.numbers, layout.BACKLASH), approach):
-        set_contact(law, turned, approach, rate, roll_rate, work)
-        _coast(group, work, wide)
-        law = law_with_coast(work)
-    return law
-
-
-@written
-def set_contact(law, turned, approach, rate, roll_rate, work):
-    """Set the rows from which the law of the back flanks is added to that of the drive flanks."""
-    for row in range(N_FORCES):
-        set_row(work, layout.LAW + row, law[row])
-    set_row(work, layout.MOTION_ROLL, turned)
-    set_row(work, layout.MOTION_APPROACH, approach)
-    set_row(work, layout.MOTION_RATE, rate)
-    set_row(work, layout.MOTION_ROLL_RATE, roll_rate)
-
-
-@written
-def law_with_coast(work):
-    """The law of both flanks, without its energies."""
-    zero = spread(work, 0.0)
-    forces = (get_row(work, layout.LAW + row) for row in range(N_FORCES))
-    return layout.Law._make((*forces, zero, zero, zero))
+    return with_coast(group, law, turned, approach, rate, roll_rate, work, wide)
 
 
 @written
@@ -184,13 +156,3 @@ def drive_law(group, nodes, instant, ahead, approach, rate, roll_rate, work):
     moment_w = get_row(numbers, layout.TANGENT_LENGTH) * friction + moment_p
     along = chosen(group.consistent, (a_0 + a_1) + a_2, zero)
     return layout.Law(normal, friction, moment_p, moment_w, along, zero, zero, zero)
-
-
-@inlined
-def _coast(group, work, wide):
-    """Write the law of the back flanks in the lanes that touch there."""
-    n = width(work)
-    for lane in range(n):
-        approach = work[at(layout.MOTION_APPROACH, lane, n)]
-        if approach < -group.numbers[at(layout.BACKLASH, lane, n)]:
-            coast_law(group, lane, work, wide)

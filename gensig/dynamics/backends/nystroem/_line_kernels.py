@@ -20,7 +20,7 @@ from gensig.dynamics._vector import (
     load_wide,
     set_row,
     spread,
-    store_wide,
+    store,
     where_above,
     width,
 )
@@ -194,7 +194,7 @@ def recenter(group, machine, wide):
     for first in range(0, n, EIGHT):
         turned = load_wide(machine, at(q + group.reference, first, n))
         center = load_wide(wide, at(layout.CENTER, first, n))
-        store_wide(wide, at(layout.CENTER, first, n), center + turned)
+        store(wide, at(layout.CENTER, first, n), center + turned)
     for d in range(n_dof):
         moved = turn * get_row(group.rotation, d)
         set_row(machine, q + d, get_row(machine, q + d) - moved)
@@ -223,7 +223,7 @@ def set_rolls(group, time, machine, wide):
         turned = since * (speed + (0.5 * since) * gain)
         turned = load_wide(profile, at(cell + lines.ANGLE, first, n)) + turned
         turned = turned + load_wide(wide, at(layout.CENTER, first, n))
-        store_wide(wide, at(layout.NOMINAL, first, n), turned)
+        store(wide, at(layout.NOMINAL, first, n), turned)
         for m in range(n_meshes):
             turn = lines.N_TOUCHED * m + lines.A_TURN
             own = block(rows.Q, n_dof) + group.touched[turn]
@@ -234,7 +234,7 @@ def set_rolls(group, time, machine, wide):
             roll = radius * roll
             begun = load_wide(group.exact, at(exact + layout.START_ROLL, first, n))
             base = m * rows.N_WIDE + layout.BASE
-            store_wide(wide, at(base, first, n), begun + roll)
+            store(wide, at(base, first, n), begun + roll)
 
 
 @inlined
@@ -336,7 +336,7 @@ def write_angles(group, angle, row, machine, wide):
             turned = load_wide(wide, at(layout.NOMINAL, first, n))
             turned = turned * load_wide(group.exact_rotation, at(d, first, n))
             turned = turned + load_wide(machine, at(own, first, n))
-            store_wide(angle, at(row * n_angles + k, first, n), turned)
+            store(angle, at(row * n_angles + k, first, n), turned)
 
 
 @inlined

@@ -20,7 +20,7 @@ from gensig.dynamics._vector import (
     lower,
     set_row,
     spread,
-    store_wide,
+    store,
     truncated,
     upper,
     where_above,
@@ -50,7 +50,7 @@ def locate(group, work, wide):
         for j in range(FOLLOWED):
             number = load_wide(wide, at(rows.NUMBER + j, first, n))
             position = roll - number * pitch
-            store_wide(wide, at(rows.POSITION + j, first, n), position)
+            store(wide, at(rows.POSITION + j, first, n), position)
             left = left or any_above(position, reach)
     return left
 
