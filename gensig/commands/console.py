@@ -156,7 +156,7 @@ class ShardProgress:
             waited = now - self._begin
             text = f"{waited:.0f} s; {self.at_work}"
             if waited > LONG_SECONDS:
-                text += "; the first run compiles for a minute or two"
+                text += "; the first run compiles for up to a minute"
             return text
         rate = last.n_made / seconds
         n_left = last.n_records - last.n_done

@@ -22,7 +22,7 @@ from gensig.production.folder import Progress, run_folder
 STATE = Progress(
     n_done=60, n_records=100, n_failed=2, n_made=40, n_bytes=8_000_000, reason=""
 )
-COMPILES = "the first run compiles for a minute or two"
+COMPILES = "the first run compiles for up to a minute"
 
 
 @pytest.fixture
