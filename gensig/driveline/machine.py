@@ -48,7 +48,7 @@ from gensig.driveline.running import (
     single_thread,
     steady_course,
 )
-from gensig.driveline.side_by_side.line_pairs import driving_angles, line_mesh_states
+from gensig.driveline.side_by_side.line_pairs import angle_channels, line_mesh_states
 from gensig.driveline.side_by_side.line_records import LineSignals, simulate_lines
 from gensig.driveline.teeth import (
     ToothLaw,
@@ -378,7 +378,7 @@ class LineMachine(Machine):
         line = self.line(run)
         kinds = [self.channel(line, name) for name in self.sensing.channels]
         if run.with_mesh_state:
-            kinds += driving_angles(line)
+            kinds += angle_channels(line)
         motion, angle = self._integrate(
             line, self.operating.duration, kinds, with_pairs=run.with_mesh_state
         )

@@ -34,6 +34,7 @@ def lower_envelope(standing_back, arc, center, relative_radius, gap):
     n_profile = arc.shape[0]
     for i in range(standing_back.shape[0]):
         back = standing_back[i]
+        # NumPy's least and search would take most of this function's compile time
         lowest = np.inf
         for j in range(n_profile):
             lowest = min(lowest, back[j])

@@ -83,7 +83,7 @@ def line_mesh_state(
     return mesh_state(pair, seen, angle, faulty_teeth(pair.table.pair, felt))
 
 
-def driving_angles(running: RunningLine) -> list[tuple[str, int]]:
+def angle_channels(running: RunningLine) -> list[tuple[str, int]]:
     """Channels of a motion that ``line_mesh_states`` needs: angles of all driving gears."""
     return [("angle", mesh.roll_dof) for mesh in running.line.meshes]
 
@@ -93,11 +93,11 @@ def line_mesh_states(
 ) -> tuple[MeshState, tuple[MeshState, ...]]:
     """Loads of the teeth of the followed mesh, and of the others in the order of the line.
 
-    The motion has ``driving_angles`` and the state of its pairs. A mesh without tabulated teeth has
+    The motion has ``angle_channels`` and the state of its pairs. A mesh without tabulated teeth has
     a force alone.
     """
     states = []
-    for m, channel in enumerate(driving_angles(running)):
+    for m, channel in enumerate(angle_channels(running)):
         nominal = running.line.rotation[channel[1]] * motion.nominal_angle
         if m in running.tabulated:
             pair = mesh_pair(running, m, run.system.operating)
