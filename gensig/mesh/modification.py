@@ -19,6 +19,7 @@ from gensig.errors import ConfigError
 from gensig.geometry.contact import SIDES, GearPair
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth, healthy_tooth
+from gensig.mesh.thermal.thermal_growth import PairGrowth
 from gensig.units import from_si, unit
 
 Array = NDArray[np.float64]
@@ -137,12 +138,14 @@ class FlankModification:
 class PairModification:
     """Both gears' modifications, and misalignment of the shafts, m over the face.
 
-    The misalignment is along the line of action.
+    The misalignment is along the line of action. ``growth`` is that of hot gears, beyond the
+    growth of the pair as a whole; None for gears as they are drawn.
     """
 
     pinion: FlankModification
     wheel: FlankModification
     misalignment: float = unit("um", default=0.0)
+    growth: PairGrowth | None = None
 
     @property
     def sides(self) -> dict[str, FlankModification]:
@@ -153,13 +156,16 @@ class PairModification:
     def is_any(self) -> bool:
         """True unless both flanks are aligned involute helicoids."""
         plain = FlankModification()
-        return self.misalignment != 0.0 or any(
+        is_cut = any(
             replace(side, profile_shape=plain.profile_shape) != plain
             for side in self.sides.values()
         )
+        return is_cut or self.misalignment != 0.0 or self.growth is not None
 
     def deviation(self, pair: GearPair, position: Array, face_position: Array) -> Array:
-        """Deviation of both flanks together where they meet, (slice, node) m, at least 0.
+        """Deviation of both flanks together where they meet, (slice, node) m.
+
+        At least 0 without growth, which can make flanks stand proud.
 
         Parameters
         ----------
@@ -173,13 +179,16 @@ class PairModification:
         return sum(profiles) + self.lead(pair, face_position)[:, None]
 
     def profile(self, pair: GearPair, name: str, curvature_radius: Array) -> Array:
-        """Depth over the profile of the gear of that name, (point,) m.
+        """Depth over the profile of the gear of that name, (point,) m, of cut and of growth.
 
-        See ``FlankModification.profile``.
+        See ``FlankModification.profile`` and ``PairGrowth.profile``.
         """
         lowest = {"pinion": 0.0, "wheel": pair.path_of_contact}
         start = pair.curvature(name, lowest[name])
-        return self.sides[name].profile(pair.gears[name], curvature_radius, start)
+        cut = self.sides[name].profile(pair.gears[name], curvature_radius, start)
+        if self.growth is None:
+            return cut
+        return cut + self.growth.profile(pair, name, curvature_radius)
 
     def lead(self, pair: GearPair, face_position: Array) -> Array:
         """Depth of both gears together across the face, (slice,) m, at least 0."""

@@ -58,18 +58,24 @@ def read_spur_pair(config: Configuration) -> SpurPair:
             f"gear.helix_angle_deg = {gear['helix_angle_deg']:g}: system=spur_pair takes spur "
             "gears, 0; helical ones have system=helical_pair"
         )
-    if read_heat(config).is_any:
-        raise ConfigError(
-            "heat: system=spur_pair has gears as they are drawn; system=helical_pair takes heat, "
-            "and spur gears too"
-        )
-    pair = read_pair(config)
+    is_hot = read_heat(config).is_any
+    flanks = read_sliced_pair(config) if is_hot else None
+    pair = flanks.pair if flanks else read_pair(config)
     machine = _read_machine(config, pair)
-    if modification.is_any and machine["mesh"].law == "paper":
+    is_linear = machine["mesh"].law == "paper"
+    if modification.is_any and is_linear:
         raise ConfigError(
             "modification opens gaps, which mesh.law=paper does not know: take "
             "mesh.law=one_sided"
         )
+    if flanks is not None:
+        if flanks.growth is not None and is_linear:
+            raise ConfigError(
+                "heat.growth opens gaps, which mesh.law=paper does not know: take "
+                "mesh.law=one_sided, or heat.growth=false"
+            )
+        modification = replace(modification, growth=flanks.growth)
+        machine["material"] = flanks.material
     sound_teeth(pair, modification)  # raises for reliefs that overlap
     return SpurPair(pair=pair, modification=modification, **machine)
 
@@ -191,7 +197,7 @@ def read_modification(config: Configuration) -> PairModification:
                 text = f"modification.{name}.{text}"
             raise ConfigError(text) from None
     common = config.section("modification").without(*SIDES)
-    return read(PairModification, common, "modification", **sides)
+    return read(PairModification, common, "modification", **sides, growth=None)
 
 
 SYSTEMS: dict[str, Callable[[Configuration], GearPairMachine]] = {

@@ -172,7 +172,7 @@ REFUSED = [
     ("shaft_line", ["system.shafting_csv=null"], "system.shafting_csv is required"),
     ("spur_pair", ["sensing=measured"], "give sensing.path.file="),
     ("spur_pair", ["sensing=shaft_line"], "no channel flywheel_speed"),
-    ("spur_pair", ["heat=chongqing_rated"], "system=helical_pair takes heat"),
+    ("spur_pair", ["heat=chongqing_rated", "mesh.law=paper"], "heat.growth=false"),
     ("spur_pair", ["excitation=engine_v20"], "leave excitation out"),
     ("spur_pair", ["sensing.sensor.adc_bits=16"], "give both adc_range_m_per_s2"),
     ("spur_pair", ["operating.turns=1"], "leave one out"),

@@ -84,6 +84,24 @@ class PairGrowth:
         proud = np.sum(self._movements(pair, points), axis=0) - common
         return proud[-1] - proud[:-1]
 
+    def profile(self, pair: GearPair, name: str, curvature_radius: Array) -> Array:
+        """Share of one gear's flank in ``deviation``, (point,) m.
+
+        Parameters
+        ----------
+        name : side of the gear
+        curvature_radius : (point,) m    beyond the path of contact its nearest end counts
+        """
+        ends = np.array([0.0, pair.path_of_contact, pair.pitch_point])
+        radii = pair.curvature(name, ends)
+        points = np.append(
+            np.clip(curvature_radius, radii[:2].min(), radii[:2].max()), radii[2]
+        )
+        growth = {"pinion": self.pinion, "wheel": self.wheel}[name]
+        moved = growth.along_action(pair.gears[name], points)
+        proud = moved - self.strain(pair) * points
+        return proud[-1] - proud[:-1]
+
     def closing(self, pair: GearPair, housing_strain: float) -> float:
         """Loss of backlash at the pitch point, along the line of action, m; negative for a gain."""
         proud = float(np.sum(self._movements(pair, np.array([pair.pitch_point]))))

@@ -144,8 +144,8 @@ REFUSED = {
     f"gensig generate {SLICED} mesh.slices_in_phase=true out=never": (
         "slices_in_phase = true is for comparing"
     ),
-    "gensig stiffness heat=chongqing_rated": "heat: system=spur_pair has gears as they are drawn",
-    "gensig simulate heat=chongqing_rated": "heat: system=spur_pair has gears as they are drawn",
+    "gensig stiffness heat=chongqing_rated mesh.law=paper": "heat.growth opens gaps",
+    "gensig simulate heat=chongqing_rated mesh.law=paper": "heat.growth opens gaps",
     f"gensig stiffness {HOT} heat.pinion_temperature_degc=400": "data, -75 to 300 degrees",
     f"gensig stiffness {HOT} mesh.friction_coefficient=0.5": "data, -75 to 300 degrees",
     f"gensig stiffness {HOT} heat.housing_temperature_degc=0": "the gears jam",

@@ -20,7 +20,7 @@ from gensig.systems.hot_pair import (
     stiffness_variants,
     sweep,
 )
-from gensig.systems.registry import read_duty, read_sliced_pair
+from gensig.systems.registry import read_duty, read_sliced_pair, read_system
 
 MESH = [
     "system=helical_pair",
@@ -264,3 +264,45 @@ def test_too_much_heat_is_refused_in_one_line(words, error, message):
     with refused(message, error) as caught:
         read_sliced_pair(config_of(*words))
     assert str(caught.value).startswith(message)
+
+
+def spur_of(*words, heat="chongqing_rated"):
+    return read_system(compose("generate", [f"heat={heat}", *words]))
+
+
+def test_both_flanks_of_spur_teeth_open_the_gap_that_slices_have():
+    pair = spur_of(*at(95, 60))
+    sound, hot = spur_of(heat="none").mesh_table(), pair.mesh_table()
+    share = hot.position / pair.pair.path_of_contact
+    on_path = (share > 0.02) & (share < 0.98)  # flanks of whole teeth end in edges
+    opened = [
+        side.gap[0] - drawn.gap[0]
+        for side, drawn in ((hot.pinion, sound.pinion), (hot.wheel, sound.wheel))
+    ]
+    growth = pair.modification.growth
+    expected = growth.deviation(pair.pair, hot.position)
+    assert np.ptp(expected[on_path]) > 2e-6
+    assert_close(sum(opened)[on_path], expected[on_path], atol=2e-8)
+
+
+def test_spur_teeth_as_warm_as_their_mates_and_housing_only_soften():
+    pair = spur_of(*at(60, 60, 60))
+    drawn = spur_of(heat="none")
+    position = pair.mesh_table().position
+    assert_close(
+        pair.modification.growth.deviation(pair.pair, position), 0.0, atol=1e-9
+    )
+    assert pair.material.youngs_modulus < drawn.material.youngs_modulus
+    assert pair.pair.base_pitch > drawn.pair.base_pitch
+    assert_close(
+        pair.pair.transverse_contact_ratio,
+        drawn.pair.transverse_contact_ratio,
+        rtol=1e-9,
+    )
+
+
+def test_linear_law_takes_softening_without_growth():
+    words = ["mesh.law=paper", "heat.growth=false", "heat.center_distance=false"]
+    pair = spur_of(*words)
+    assert pair.modification.growth is None
+    assert pair.material.youngs_modulus < spur_of(heat="none").material.youngs_modulus
