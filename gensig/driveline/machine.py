@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.driveline import loads
+from gensig.driveline.channels import channel, channel_rows
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.engine_torques import Engine
 from gensig.driveline.line_gears import (
     gear_channels,
-    gear_dof,
     gear_names,
     line_bodies,
     line_gears,
@@ -61,7 +61,6 @@ from gensig.driveline.teeth import (
     tooth_table,
 )
 from gensig.driveline.time.newmark import LineMotion, LineSolver
-from gensig.driveline.wheel_channels import wheel_of, wheel_speed
 from gensig.dynamics._layout import MOST_PAIRS
 from gensig.dynamics.integrator import check_memory
 from gensig.dynamics.mesh_state import MeshState
@@ -79,6 +78,7 @@ from gensig.sensing.manufacturing import perfect_specimen
 from gensig.sensing.toothed_wheel import draw_wheel
 from gensig.systems.base import Machine, MachineMesh, home_meshes, specimen_table
 from gensig.systems.run import CleanRecord, Run, Start, angle_from_tooth_0
+from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.stiffness_curves import StiffnessCurves, stiffness_curves
 from gensig.systems.supports import supports_in_gearbox
 from gensig.units import SPEED
@@ -93,8 +93,9 @@ MOST_ENERGY_RESIDUAL = 1e-3
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineMachine(Machine):
-    """An engine or a motor on its drive line; ``mesh_number`` that of the followed mesh, whose
-    gears have the ``modification``.
+    """An engine or a motor on its drive line.
+
+    ``modification`` is that of the followed mesh, whose number is ``mesh_number``.
     """
 
     engine: EngineLine
@@ -106,6 +107,16 @@ class LineMachine(Machine):
     def pair(self) -> GearPair:
         """Driving and driven gear of the followed mesh, as pinion and wheel."""
         return named_by_side(self.engine.drive.pairs[self.mesh_number])
+
+    @property
+    def flanks(self) -> SlicedPair:
+        """As ``Machine.flanks``, under the mean force at the set-point."""
+        return self.law.flanks(self.pair, self.mesh_force)
+
+    @property
+    def has_whole_teeth(self) -> bool:
+        """True where the followed mesh is of spur gears."""
+        return self.pair.pinion.helix_angle == 0.0
 
     @property
     def gears(self) -> dict[str, Gear]:
@@ -336,14 +347,18 @@ class LineMachine(Machine):
 
         Raises
         ------
-        ConfigError        for helical meshes and machines that do not run steadily
+        ConfigError        for machines that do not run steadily
         SimulationError    for a motion that cannot be integrated
         """
-        if self.pair.pinion.helix_angle != 0.0:
-            raise ConfigError(
-                "life: on a drive line damage grows on spur gears, but mesh "
-                f"{self.engine.mesh_names[self.mesh_number]} is helical; choose another gear"
-            )
+        return loads.greatest_loads(self.pair, *self._steady_run(speed, torque))
+
+    def mean_torque(self, speed: float, torque: float) -> float:
+        """As ``Machine.mean_torque``, with runs and errors of ``mesh_torques``."""
+        _, force = self._steady_run(speed, torque)
+        return loads.mean_torque(self.pair, force)
+
+    def _steady_run(self, speed: float, torque: float) -> tuple[Array, Array]:
+        """Angle of the pinion and force of the followed mesh at a set-point, (sample,) each."""
         if not self.operating.is_steady:
             raise ConfigError(
                 "life: on a drive line set-points are steady; take operating=rated"
@@ -354,7 +369,7 @@ class LineMachine(Machine):
         line = machine.line(Run(system=machine, faults=()))
         force = "mesh_force", machine.mesh_number
         motion, angle = machine._integrate(line, loads.SECONDS, [force])
-        return loads.greatest_loads(machine.pair, angle, motion.signals[force])
+        return angle, motion.signals[force]
 
     @classmethod
     def simulate_runs(
@@ -376,7 +391,7 @@ class LineMachine(Machine):
     @single_thread
     def _record(self, run: Run[LineMachine]) -> CleanRecord:
         line = self.line(run)
-        kinds = [self.channel(line, name) for name in self.sensing.channels]
+        kinds = self.signals(line)
         if run.with_mesh_state:
             kinds += angle_channels(line)
         motion, angle = self._integrate(
@@ -474,26 +489,13 @@ class LineMachine(Machine):
             has_cycle=isinstance(self.engine.engine, Engine),
         )
 
+    def signals(self, line: RunningLine) -> list[tuple[str, int]]:
+        """Signals of the integration for the channels, see ``channel``."""
+        followed, names = self.mesh_number, self.sensing.channels
+        return [channel(line, followed, name) for name in names]
+
     def rows(
         self, run: Run[Self], line: RunningLine, motion: LineMotion | LineSignals
     ) -> Array:
         """Signals of the channels with the gains of a run's gearbox, (channel, sample)."""
-        names = self.sensing.channels
-        gains = np.ones(len(names))
-        if run.gearbox is not None:
-            gains = run.gearbox.gain
-        rows = []
-        for name, gain in zip(names, gains, strict=True):
-            kind = self.channel(line, name)
-            if kind[0] == "angle":
-                rate = self.sensing.sampling_rate
-                rows.append(wheel_speed(run.discs, line, motion, name, rate))
-            else:
-                rows.append(gain * motion.signals[kind])
-        return np.array(rows)
-
-    def channel(self, line: RunningLine, name: str) -> tuple[str, int]:
-        """Signal of the integration for a channel: a kind and a degree of freedom."""
-        if name.endswith(SPEED):
-            return "angle", line.dof(wheel_of(self.engine, name)[1].node)
-        return "acceleration", gear_dof(line, self.mesh_number, name)
+        return channel_rows(run, line, motion, self.mesh_number)

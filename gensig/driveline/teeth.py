@@ -38,6 +38,7 @@ from gensig.mesh.sliced.slices import slice_middles
 from gensig.sensing.manufacturing import GearErrors, Specimen
 from gensig.systems.base import home_meshes
 from gensig.systems.run import Start
+from gensig.systems.sliced_pair import SlicedPair
 
 Array = NDArray[np.float64]
 
@@ -58,6 +59,17 @@ class ToothLaw:
     options: MeshOptions
     slices: SliceOptions
     modification: PairModification = PLAIN
+
+    def flanks(self, pair: GearPair, force: float) -> SlicedPair:
+        """A pair at rest under a mean force in N, in slices."""
+        return SlicedPair(
+            pair=pair,
+            material=self.material,
+            mesh=self.options,
+            slices=self.slices,
+            modification=self.modification,
+            torque=force * pair.pinion.base_radius,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,9 +6,10 @@ A new law needs a name in ``gensig.faults.base.Growth``, its parameters in
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,45 +22,75 @@ from gensig.geometry.contact import SIDES
 from gensig.life.crack_growth import CrackGrowthOptions
 from gensig.life.growth import GrowthLaw
 from gensig.life.life_options import WearGrowthOptions
-from gensig.life.load_history import History
+from gensig.life.options import read_wear_options
 from gensig.life.pit_growth import PitGrowthOptions
 from gensig.life.wear.wear_growth import WearGrowth, WearTable, wear_table
 from gensig.options.configuration import Configuration
 from gensig.record.vibration_limit import limited_by_vibration
-from gensig.systems.base import Machine
+from gensig.systems.base import Machine, MachineMesh, home_meshes
 from gensig.systems.growth_laws import crack_law, pit_law
-from gensig.systems.wear import read_wear_case, wear_fault
+from gensig.systems.wear import OF_PAIR, flank_wear, wear_fault
 
 Array = NDArray[np.float64]
 
 HEALTHY = {"kind": "healthy"}
 
 
+SetPoint = tuple[float, float]
+"""Speed in rad/s and torque in N m as the configuration gives them."""
+
+
+def corners(speed: Array, torque: Array) -> tuple[SetPoint, ...]:
+    """Set-points with the least and the greatest of all speeds and torques, any shapes."""
+    speeds = {float(speed.min()), float(speed.max())}
+    torques = {float(torque.min()), float(torque.max())}
+    return tuple(product(sorted(speeds), sorted(torques)))
+
+
 class LifeGears:
-    """The gears of a plan of lives; tooth loads and worn flanks are computed once.
+    """The gears of one mesh in a plan of lives; loads and worn flanks are computed once.
 
     Parameters
     ----------
     config : of the plan
-    torques : least and greatest torque of all its set-points, N m
+    machine : that follows this mesh
+    corners : set-points between which those of all units lie
+    names : of the pinion and the wheel in the machine of the plan, by their sides of this mesh;
+        of those whose faults are on the flanks that work here
     """
 
     def __init__(
         self,
         config: Configuration,
         machine: Machine,
-        torques: tuple[float, float],
+        corners: Sequence[SetPoint],
+        names: Mapping[str, str] = OF_PAIR,
     ) -> None:
-        self.machine, self.torques = machine, torques
-        self._config = config
-        self._loads: dict[tuple[float, float], Array] = {}
+        self.machine, self.names = machine, names
+        self._config, self._corners = config, corners
         self._others: dict[str, tuple[LifeGears, str]] = {}
+        self._tooth_loads = cache(self._tooth_loads_at)
 
-    def tooth_loads(self, speed: float, torque: float) -> Array:
-        """Loads that a tooth meets at a set-point, (mesh,) N m."""
-        if (speed, torque) not in self._loads:
-            self._loads[speed, torque] = self.machine.mesh_torques(speed, torque)
-        return self._loads[speed, torque]
+    def tooth_loads(self, points: Sequence[SetPoint]) -> tuple[Array, ...]:
+        """Loads that a tooth meets at each set-point, (mesh,) N m of the pinion each."""
+        return tuple(self._tooth_loads(*_rounded(point)) for point in points)
+
+    def mean_loads(self, points: Sequence[SetPoint]) -> tuple[Array, ...]:
+        """Mean torque of the pinion at each set-point, (1,) N m each."""
+        ratio = self.machine.ratio
+        means = (
+            self.machine.mean_torque(speed * ratio, torque) for speed, torque in points
+        )
+        return tuple(np.array([mean]) for mean in means)
+
+    @cached_property
+    def torques(self) -> tuple[float, float]:
+        """Least and greatest torque of the pinion between the corners, N m.
+
+        Of the loads of a set-point the greatest counts.
+        """
+        greatest = [float(loads.max()) for loads in self.tooth_loads(self._corners)]
+        return min(greatest), max(greatest)
 
     def of_gear(self, gear: str) -> tuple[LifeGears, str]:
         """The gears of the home mesh of a gear, and its side there."""
@@ -67,37 +98,72 @@ class LifeGears:
             return self, gear
         if gear not in self._others:
             machine, side = self.machine.at_gear(gear)
-            self._others[gear] = LifeGears(self._config, machine, self.torques), side
+            number = home_meshes(self.machine.meshes)[gear]
+            names = worn_together(self.machine.meshes, number)
+            there = LifeGears(self._config, machine, self._corners, names)
+            self._others[gear] = there, side
         return self._others[gear]
+
+    def _tooth_loads_at(self, speed: float, torque: float) -> Array:
+        return self.machine.mesh_torques(speed * self.machine.ratio, torque)
 
     @cached_property
     def wear(self) -> WearTable:
-        """Wear of the sound flanks between the two torques."""
+        """Wear of the sound flanks between the mean torques of the corners."""
         sound = self._config.with_entries(fault=HEALTHY)
-        case, _ = limited_by_vibration(read_wear_case(sound), sound)
-        return wear_table(case, *self.torques)
+        options = read_wear_options(sound.section("wear"))
+        case = flank_wear(self.machine.flanks, options)
+        case, _ = limited_by_vibration(case, sound, self.names)
+        means = np.concatenate(self.mean_loads(self._corners))
+        return wear_table(case, float(means.min()), float(means.max()))
+
+
+def worn_together(meshes: Sequence[MachineMesh], number: int) -> dict[str, str]:
+    """Gears of a mesh whose faults are on the flanks that work in it, by their sides.
+
+    A gear whose home mesh is another one and meets its other flank there is left out.
+    """
+    homes = home_meshes(meshes)
+    gears = {}
+    for side, name in zip(SIDES, meshes[number].gears, strict=True):
+        at_home = SIDES[meshes[homes[name]].gears.index(name)]
+        if at_home == side:
+            gears[side] = name
+    return gears
+
+
+def _rounded(point: SetPoint) -> SetPoint:
+    """A set-point to 12 digits: that of a history has passed through the ratio of a gear."""
+    speed, torque = (float(f"{value:.12g}") for value in point)
+    return speed, torque
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UnitGrowth:
-    """Growth law of one unit, and the size at which its life begins."""
+    """Growth law of one unit, and the size at which its life begins.
+
+    ``loads`` are what the law meets at every set-point, (mesh,) N m each.
+    """
 
     law: GrowthLaw
     start: float
+    loads: tuple[Array, ...]
 
 
 def paris(
     gears: LifeGears,
     fault: Crack,
     options: CrackGrowthOptions,
-    history: History,
+    points: Sequence[SetPoint],
     first: float,
 ) -> UnitGrowth:
     """A root crack that begins at a share of the root chord."""
     gear = gears.machine.pair.gears[fault.gear]
     law = crack_law(gears.machine, fault.seed(), options, gears.torques)
     return UnitGrowth(
-        law=law, start=options.start_share * first * fault.root_chord(gear)
+        law=law,
+        start=options.start_share * first * fault.root_chord(gear),
+        loads=gears.tooth_loads(points),
     )
 
 
@@ -105,36 +171,37 @@ def pits(
     gears: LifeGears,
     fault: DistributedPitting,
     options: PitGrowthOptions,
-    history: History,
+    points: Sequence[SetPoint],
     first: float,
 ) -> UnitGrowth:
     """Pits of a flank that begins sound."""
     law = pit_law(gears.machine, fault, options, first, gears.torques)
-    return UnitGrowth(law=law, start=0.0)
+    return UnitGrowth(law=law, start=0.0, loads=gears.tooth_loads(points))
 
 
 def archard(
     gears: LifeGears,
     fault: Wear,
     options: WearGrowthOptions,
-    history: History,
+    points: Sequence[SetPoint],
     first: float,
 ) -> UnitGrowth:
-    """Wear of both gears' flanks, which begin new."""
-    table = gears.wear
+    """Wear of both gears' flanks, which begin new, under the mean loads."""
+    table, loads = gears.wear, gears.mean_loads(points)
     case = table.lives[0].case
-    torque = float(np.exp(np.log(history.torque).mean()))
+    torque = float(np.exp(np.log(np.concatenate(loads)).mean()))
     law = WearGrowth(
-        table=table, torque=torque, as_fault=lambda depth: wear_fault(case, depth)
+        table=table,
+        torque=torque,
+        as_fault=lambda depth: wear_fault(case, depth, gears.names),
     )
-    return UnitGrowth(law=law, start=0.0)
+    return UnitGrowth(law=law, start=0.0, loads=loads)
 
 
-# Builders take the gears, a fault with this growth, the options of its law, the unit's history of
-# loads, and the unit's factor on the first size of its damage.
+# Builders take the gears, a fault with this growth, the options of its law, the unit's set-points,
+# and the unit's factor on the first size of its damage.
 LAWS: Mapping[Growth, Callable[..., UnitGrowth]] = {
     Growth.PARIS: paris,
     Growth.PITS: pits,
     Growth.ARCHARD: archard,
 }
-PAIRS_ONLY = (Growth.ARCHARD,)  # laws that are not followed on drive lines

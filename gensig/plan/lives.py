@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from gensig.dataset.distributions import GRID
 from gensig.errors import ConfigError
 from gensig.faults.base import require_gears
-from gensig.faults.registry import FAULTS, fault_parts, read_faults
+from gensig.faults.registry import fault_parts, read_faults
 from gensig.life.growth import Course, GrowthLaw, grow
 from gensig.life.life_options import LifeOptions, read_life
 from gensig.life.load_history import History, draw_history, given_history
 from gensig.life.snapshots import snapshot_times
 from gensig.options.configuration import Configuration, whole_number
 from gensig.plan.draws import draw_class_faults, draw_values
-from gensig.plan.growth_table import LAWS, PAIRS_ONLY, LifeGears
+from gensig.plan.growth_table import LAWS, LifeGears, corners
 from gensig.record.machines import read_machine
 from gensig.record.options import (
     GEAR_KEYS,
@@ -29,7 +29,6 @@ from gensig.record.options import (
 )
 from gensig.record.streams import Stream, stream
 from gensig.systems.base import Machine
-from gensig.systems.registry import LINE
 from gensig.units import from_si
 
 Array = NDArray[np.float64]
@@ -78,7 +77,7 @@ def snapshots(config: Configuration) -> Iterator[Snapshot]:
     n_setpoints = len(points) // n_units
     speed, torque = _speed_and_torque(machine, points, n_units)
     faults = draw_class_faults(config, np.arange(n_units))
-    gears = LifeGears(config, machine, (float(torque.min()), float(torque.max())))
+    gears = LifeGears(config, machine, corners(speed, torque))
     number = 0
     for unit in range(n_units):
         order = stream(seed, Stream.ORDER, unit // len(names)).permutation(len(names))
@@ -124,7 +123,7 @@ class _Life:
     Parameters
     ----------
     fault : boundary keys
-    loads : of a tooth at every set-point, (mesh,) N m each
+    loads : of the damaged teeth at every set-point, (mesh,) N m each
     """
 
     fault: Mapping[str, Any]
@@ -182,14 +181,12 @@ def _life(
     there, side = gears.of_gear(defect.gear)
     faster = there.machine.ratio / gears.machine.ratio
     damage = replace(defect, gear=side)
-    unit = LAWS[defect.growth](there, damage, growth, history, first)
-    points = zip(
-        (history.speed * faster).tolist(), history.torque.tolist(), strict=True
-    )
-    loads = tuple(there.tooth_loads(*point) for point in points)
-    turns = unit.law.turns(loads) / (rate * faster)
+    speeds = (history.speed / gears.machine.ratio).tolist()
+    points = tuple(zip(speeds, history.torque.tolist(), strict=True))
+    unit = LAWS[defect.growth](there, damage, growth, points, first)
+    turns = unit.law.turns(unit.loads) / (rate * faster)
     course = grow(unit.law.sizes, turns, history, unit.start)
-    return _Life(fault=fault, law=unit.law, loads=loads, course=course)
+    return _Life(fault=fault, law=unit.law, loads=unit.loads, course=course)
 
 
 def _checked_units(config: Configuration, options: LifeOptions) -> int:
@@ -217,12 +214,6 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
             raise ConfigError(
                 f"plan.classes: nothing makes {name} grow; this life has {grown}: take "
                 "life=mixed, or other classes"
-            )
-        unfollowed = sorted(kind for kind in kinds if FAULTS[kind].growth in PAIRS_ONLY)
-        if config["system"]["kind"] == LINE and unfollowed:
-            raise ConfigError(
-                f"plan.classes: {name}: {unfollowed[0]} is not followed on a drive line; "
-                f"take life=crack_growth or life=pit_growth"
             )
     _refuse_designs(config, options)
     for key in options.drift:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from gensig.options.configuration import Configuration
 from gensig.record.inputs import InputReader, RecordInputs, simulate_motions
 from gensig.sensing.chain import power
 from gensig.systems.base import Machine
-from gensig.systems.wear import wear_fault
+from gensig.systems.wear import OF_PAIR, wear_fault
 from gensig.units import channel_unit
 
 Array = NDArray[np.float64]
@@ -71,6 +71,7 @@ class _Bench:
 
     sound: RecordInputs
     case: WearCase
+    gears: Mapping[str, str]
 
     @property
     def machine(self) -> Machine:
@@ -103,23 +104,24 @@ class _Bench:
         """
         if not depth.any():
             return self.sound
-        parts = json.loads(json.dumps(fault_parts(wear_fault(self.case, depth))))
+        worn = wear_fault(self.case, depth, self.gears)
+        parts = json.loads(json.dumps(fault_parts(worn)))
         faults = [fault for part in parts for fault in read_faults(part, "faults_json")]
         return replace(self.sound, run=replace(self.sound.run, faults=tuple(faults)))
 
 
 def limited_by_vibration(
-    case: WearCase, config: Configuration
+    case: WearCase, config: Configuration, gears: Mapping[str, str] = OF_PAIR
 ) -> tuple[WearCase, WornVibration | None]:
     """The case with the depth of a limit of vibration as threshold, and the measured course.
 
     The case as it was, and None, where ``wear`` sets no such limit; the case as it was where the
     life to its threshold ends below the limit.
 
-    The flanks wear under the case's torque. At ``N_LOOKS`` times the machine is simulated with
-    the flanks as they are then; between the first look at the limit or above and the one before,
-    the root is found by Brent's method, of at most ``MOST_STEPS`` records. A limit that is passed
-    and left again between two looks goes unseen.
+    ``gears`` are as in ``wear_fault``. The flanks wear under the case's torque. At ``N_LOOKS``
+    times the machine is simulated with the flanks as they are then; between the first look at the
+    limit or above and the one before, the root is found by Brent's method, of at most
+    ``MOST_STEPS`` records. A limit that is passed and left again between two looks goes unseen.
 
     Raises
     ------
@@ -131,7 +133,7 @@ def limited_by_vibration(
     options = case.options
     if options.vibration_limit_m_per_s2 is None and options.vibration_rise is None:
         return case, None
-    bench = _bench(case, config)
+    bench = _bench(case, config, gears)
     life = wear_life(case)
     turns = np.linspace(0.0, life.life, N_LOOKS)
     looks = bench.rms([_worn(life, turn) for turn in turns])
@@ -169,12 +171,12 @@ def limited_by_vibration(
     return replace(case, options=replace(options, threshold=limit_depth)), course
 
 
-def _bench(case: WearCase, config: Configuration) -> _Bench:
+def _bench(case: WearCase, config: Configuration, gears: Mapping[str, str]) -> _Bench:
     config = config.with_keys("plan", sham=False)
     config = config.with_keys("dataset", store_mesh_state=False)
     sound = InputReader(config).inputs(ROW)
     sound.machine.check()
-    bench = _Bench(sound=sound, case=case)
+    bench = _Bench(sound=sound, case=case, gears=gears)
     if not bench.sensors:
         raise ConfigError(
             f"sensing.channels = {list(bench.machine.sensing.channels)}: a limit of the "

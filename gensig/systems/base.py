@@ -29,6 +29,7 @@ from gensig.sensing.chain import Sensing
 from gensig.sensing.encoder import Disc
 from gensig.sensing.manufacturing import FurtherGear, Gearbox, Quality, Specimen
 from gensig.systems.run import CleanRecord, Run, Start
+from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.stiffness_curves import StiffnessCurves
 
 Array = NDArray[np.float64]
@@ -101,6 +102,16 @@ class Machine(ABC):
     @abstractmethod
     def pair(self) -> GearPair:
         """Geometry of the mesh that records follow."""
+
+    @property
+    @abstractmethod
+    def flanks(self) -> SlicedPair:
+        """The followed mesh at rest, sound, under its mean torque; its flanks cut into slices."""
+
+    @property
+    @abstractmethod
+    def has_whole_teeth(self) -> bool:
+        """True where records have spur teeth whole, False where they have them in slices."""
 
     @property
     @abstractmethod
@@ -182,6 +193,13 @@ class Machine(ABC):
         Returns
         -------
         (mesh,) N m      torques of the pinion
+        """
+
+    @abstractmethod
+    def mean_torque(self, speed: float, torque: float) -> float:
+        """Mean torque of the pinion on the working flanks of the followed mesh, N m.
+
+        Wear goes with it. Parameters as in ``mesh_torques``.
         """
 
     @abstractmethod

@@ -20,7 +20,6 @@ from gensig.life.sliced_crack import sliced_crack_growth
 from gensig.life.sliced_stress import sliced_contact_stress
 from gensig.material import Material
 from gensig.systems.base import Machine
-from gensig.systems.helical_pair import HelicalPair
 from gensig.systems.sliced_pair import SlicedPair
 
 Array = NDArray[np.float64]
@@ -36,9 +35,9 @@ def crack_law(
 ) -> CrackGrowth:
     """The law of a crack like ``crack``.
 
-    ``torques`` in N m are the least and the greatest of the life.
+    ``torques`` in N m are the least and the greatest of the life, on the pinion of the mesh.
     """
-    if not isinstance(machine, HelicalPair):
+    if machine.has_whole_teeth:
         return _spur_crack_law(machine.pair, machine.material, crack, options)
     return _sliced_crack_law(_for_lives(machine.flanks), crack, options, torques)
 
@@ -54,7 +53,7 @@ def pit_law(
 
     ``torques`` as in ``crack_law``.
     """
-    if not isinstance(machine, HelicalPair):
+    if machine.has_whole_teeth:
         return pit_growth(machine.pair, machine.material, pits, options, first)
     between = _between(torques)
     flanks = _for_lives(machine.flanks)

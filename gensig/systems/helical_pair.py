@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import final
 
 from gensig.dynamics._layout import MOST_PAIRS
@@ -26,7 +26,12 @@ class HelicalPair(GearPairMachine):
     at rest, for transmission error, load over the flanks and stiffness.
     """
 
-    flanks: SlicedPair
+    flanks: SlicedPair = field()
+
+    @property
+    def has_whole_teeth(self) -> bool:
+        """False, without a helix too."""
+        return False
 
     @property
     def gear_channels(self) -> tuple[str, ...]:

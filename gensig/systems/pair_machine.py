@@ -140,6 +140,10 @@ class GearPairMachine(Machine):
         """The set torque: every mesh of a tooth has the same load, (1,) N m."""
         return np.array([torque])
 
+    def mean_torque(self, speed: float, torque: float) -> float:
+        """The set torque."""
+        return torque
+
     def driven_tooth(self, tooth_pinion: int, drawn: int) -> int:
         """The drawn tooth: the gears are mounted anew for every record."""
         return drawn

@@ -77,7 +77,8 @@ def read_spur_pair(config: Configuration) -> SpurPair:
         modification = replace(modification, growth=flanks.growth)
         machine["material"] = flanks.material
     sound_teeth(pair, modification)  # raises for reliefs that overlap
-    return SpurPair(pair=pair, modification=modification, **machine)
+    slices = read_slice_options(config.section("mesh"))
+    return SpurPair(pair=pair, slices=slices, modification=modification, **machine)
 
 
 def read_helical_pair(config: Configuration) -> HelicalPair:

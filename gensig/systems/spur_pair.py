@@ -23,9 +23,10 @@ from gensig.mesh.modification import (
     PairModification,
     sound_teeth,
 )
-from gensig.mesh.options import MeshOptions
+from gensig.mesh.options import MeshOptions, SliceOptions
 from gensig.mesh.pair_table import N_PAIRS, PairTable
 from gensig.systems.pair_machine import GearPairMachine
+from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.stiffness_curves import (
     StiffnessCurves,
     single_pair,
@@ -38,9 +39,31 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpurPair(GearPairMachine):
-    """A spur gear pair; ``modification`` is that of all teeth, before errors and faults."""
+    """A spur gear pair; ``modification`` is that of all teeth, before errors and faults.
 
+    ``slices`` are those of ``flanks``.
+    """
+
+    slices: SliceOptions
     modification: PairModification = PLAIN
+
+    @property
+    def flanks(self) -> SlicedPair:
+        """As ``Machine.flanks``."""
+        return SlicedPair(
+            pair=self.pair,
+            material=self.material,
+            mesh=self.mesh,
+            slices=self.slices,
+            modification=replace(self.modification, growth=None),
+            torque=self.operating.torque,
+            growth=self.modification.growth,
+        )
+
+    @property
+    def has_whole_teeth(self) -> bool:
+        """True."""
+        return True
 
     @property
     def gear_channels(self) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -10,13 +11,15 @@ from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
-from gensig.life.options import read_wear_options
+from gensig.life.options import WearOptions, read_wear_options
 from gensig.life.wear.wear_case import WearCase, wear_case
 from gensig.options.configuration import Configuration
 from gensig.systems.registry import SIDES, read_sliced_pair
+from gensig.systems.sliced_pair import SlicedPair
 
 Array = NDArray[np.float64]
 
+OF_PAIR = {side: side for side in SIDES}
 N_PROFILE = 65  # depths along the flank in a fault of kind wear
 
 
@@ -32,31 +35,37 @@ def read_wear_case(config: Configuration) -> WearCase:
             f"fault={config['fault']['kind']}: a life begins with sound flanks; "
             "take fault=healthy"
         )
-    system = read_sliced_pair(config)
-    # all slices of plain spur teeth are alike
-    if system.pair.pinion.helix_angle == 0.0 and not system.modification.is_any:
-        system = replace(system, slices=replace(system.slices, n_slices=1))
-    return wear_case(
-        system.sliced_mesh(),
-        system.material,
-        read_wear_options(config.section("wear")),
-        system.torque,
+    return flank_wear(
+        read_sliced_pair(config), read_wear_options(config.section("wear"))
     )
 
 
-def wear_fault(case: WearCase, depth: Array) -> dict[str, Any]:
+def flank_wear(flanks: SlicedPair, options: WearOptions) -> WearCase:
+    """Wear of sound flanks under their torque; errors as ``wear_case`` raises."""
+    # all slices of plain spur teeth are alike
+    if flanks.pair.pinion.helix_angle == 0.0 and not flanks.modification.is_any:
+        flanks = replace(flanks, slices=replace(flanks.slices, n_slices=1))
+    return wear_case(flanks.sliced_mesh(), flanks.material, options, flanks.torque)
+
+
+def wear_fault(
+    case: WearCase, depth: Array, gears: Mapping[str, str] = OF_PAIR
+) -> dict[str, Any]:
     """A compound fault option with the wear of both gears' teeth after a life.
 
     Parameters
     ----------
     depth : (2, slice, node) m    off both flanks; the mean over the slices counts, as a fault of
         kind wear is the same across the face
+    gears : names of the gears that are worn, by their sides of the mesh
 
     Depths normal to the flank become those along the transverse line of action, over cos(beta_b).
     """
     slant = np.cos(case.pair.base_helix_angle)
     parts = []
     for side, name in enumerate(SIDES):
+        if name not in gears:
+            continue
         profile = flank_profile(case, side, depth[side].mean(axis=0) / slant)
         greatest = float(profile.max())
         shape = np.zeros_like(profile)
@@ -65,7 +74,7 @@ def wear_fault(case: WearCase, depth: Array) -> dict[str, Any]:
         parts.append(
             {
                 "kind": "wear",
-                "gear": name,
+                "gear": gears[name],
                 "tooth": "all",
                 "wear_depth_um": round(greatest * 1e6, 6),
                 "wear_profile": [round(float(share), 6) for share in shape],

@@ -177,12 +177,6 @@ REFUSED = [
     ("spur_pair", ["sensing.sensor.adc_bits=16"], "give both adc_range_m_per_s2"),
     ("spur_pair", ["operating.turns=1"], "leave one out"),
     ("spur_pair", ["life=crack_growth"], "leave it null"),
-    (
-        "phm09_helical_two_stage",
-        ["life=crack_growth", "plan.n_records=null"],
-        "take system=helical_pair",
-    ),
-    ("two_stage_gearbox", ["life=wear", "plan.n_records=null"], "life=pit_growth"),
     ("spur_pair", ["sensing.tacho.shaft=motor"], "allowed: pinion, wheel"),
     ("spur_pair", ["sensing.encoder.shaft=load"], "allowed: pinion, wheel"),
     (

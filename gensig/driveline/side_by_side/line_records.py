@@ -119,7 +119,7 @@ def _together(
 ) -> list[CleanRecord | SimulationError]:
     machine, first = runs[0].system, machines[0]
     rate, solver = _rate(runs[0]), machine.solver
-    kinds = [machine.channel(first.running, name) for name in machine.sensing.channels]
+    kinds = machine.signals(first.running)
     dofs = [dof for kind, dof in kinds if kind == "acceleration"]
     integration = Integration(
         sampling_rate=rate,

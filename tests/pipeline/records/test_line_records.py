@@ -125,6 +125,7 @@ def test_stiffness_is_that_of_the_record_mesh(tmp_path):
     # the same teeth as a pair, under what the first stage makes of the torque
     line = read_machine(read_request(list(words)).config)
     alone = SpurPair(
+        slices=line.slices,
         pair=line.pair,
         material=line.material,
         mesh=line.mesh,

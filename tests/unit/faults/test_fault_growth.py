@@ -8,7 +8,7 @@ from fault_cases import KINDS, one
 from gensig.faults.base import Growth
 from gensig.faults.registry import FAULTS
 from gensig.life.life_options import OPTIONS
-from gensig.plan.growth_table import LAWS, PAIRS_ONLY
+from gensig.plan.growth_table import LAWS
 
 GROWING = [kind for kind in KINDS if FAULTS[kind].growth is not Growth.NONE]
 
@@ -25,7 +25,6 @@ def test_three_kinds_grow():
 def test_every_law_has_parameters_and_a_builder():
     laws = set(Growth) - {Growth.NONE}
     assert set(LAWS) == set(OPTIONS) == laws
-    assert set(PAIRS_ONLY) <= laws
 
 
 @pytest.mark.parametrize("kind", GROWING)
