@@ -55,6 +55,7 @@ from gensig.driveline.teeth import (
     felt_there,
     followed_mesh,
     line_teeth,
+    modified_there,
     require_drive,
     require_teeth,
     start_of,
@@ -130,16 +131,6 @@ class LineMachine(Machine):
     def bodies(self) -> dict[str, Body]:
         """Mass and support of every gear, and the inertia of its node."""
         return line_bodies(self.engine.drive, self.mesh_number)
-
-    @property
-    def pinion(self) -> Body:
-        """Mass, inertia and support of the driving gear of the followed mesh."""
-        return self.bodies[self.pair.pinion.name]
-
-    @property
-    def wheel(self) -> Body:
-        """Mass, inertia and support of the driven gear of the followed mesh."""
-        return self.bodies[self.pair.wheel.name]
 
     @property
     def meshes(self) -> tuple[MachineMesh, ...]:
@@ -334,7 +325,11 @@ class LineMachine(Machine):
         """As ``Machine.at_gear``."""
         number = home_meshes(self.meshes)[gear]
         side = SIDES[self.meshes[number].gears.index(gear)]
-        other = replace(self, mesh_number=number)
+        drive, followed = self.engine.drive, self.mesh_number
+        cut = self.modification
+        if number != followed:
+            cut = modified_there(drive, followed, number, cut)
+        other = replace(self, mesh_number=number, modification=cut)
         speed = self.operating.speed * other.ratio / self.ratio
         return replace(other, operating=replace(self.operating, speed=speed)), side
 
