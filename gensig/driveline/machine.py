@@ -51,6 +51,7 @@ from gensig.driveline.running import (
 from gensig.driveline.side_by_side.line_pairs import angle_channels, line_mesh_states
 from gensig.driveline.side_by_side.line_records import LineSignals, simulate_lines
 from gensig.driveline.teeth import (
+    MeshHeat,
     ToothLaw,
     felt_there,
     followed_mesh,
@@ -96,13 +97,14 @@ MOST_ENERGY_RESIDUAL = 1e-3
 class LineMachine(Machine):
     """An engine or a motor on its drive line.
 
-    ``modification`` is that of the followed mesh, whose number is ``mesh_number``.
+    Records follow the mesh ``mesh_number``; ``modification`` and ``heat`` as in ``ToothLaw``.
     """
 
     engine: EngineLine
     mesh_number: int
     slices: SliceOptions
     modification: PairModification = PLAIN
+    heat: tuple[MeshHeat | None, ...] = ()
 
     @property
     def pair(self) -> GearPair:
@@ -112,7 +114,7 @@ class LineMachine(Machine):
     @property
     def flanks(self) -> SlicedPair:
         """As ``Machine.flanks``, under the mean force at the set-point."""
-        return self.law.flanks(self.pair, self.mesh_force)
+        return self.followed_law.flanks(self.pair, self.mesh_force)
 
     @property
     def has_whole_teeth(self) -> bool:
@@ -196,9 +198,8 @@ class LineMachine(Machine):
     @property
     def mesh_force(self) -> float:
         """Mean normal force of the mesh at the set-point, N, or what closes it by 2 um."""
-        return reference_force(
-            self.engine, self.mesh_number, float(self.mesh_forces[self.mesh_number])
-        )
+        number = self.mesh_number
+        return reference_force(self.engine, number, float(self.mesh_forces[number]))
 
     @property
     def mesh_forces(self) -> Array:
@@ -215,14 +216,20 @@ class LineMachine(Machine):
             options=self.mesh,
             slices=self.slices,
             modification=self.modification,
+            heat=self.heat,
         )
+
+    @property
+    def followed_law(self) -> ToothLaw:
+        """The law of the followed mesh, hot where the line is."""
+        return self.law.at_mesh(self.mesh_number)
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable | SlicedTable:
         """Tables of the followed mesh with those of the given faults that it feels."""
         drive = self.engine.drive
         require_teeth(drive, self.mesh_number, faults)
         felt = felt_there(drive, self.mesh_number, self.mesh_number, faults)
-        return tooth_table(self.law, self.pair, felt, self.mesh_force)
+        return tooth_table(self.followed_law, self.pair, felt, self.mesh_force)
 
     def faulty_meshes(
         self, faults: Sequence[Fault]
@@ -249,22 +256,19 @@ class LineMachine(Machine):
         """
         name = self.engine.mesh_names[self.mesh_number]
         require_followed(name, faults)
+        law = self.followed_law
         return stiffness_curves(
-            self,
+            replace(self, material=law.material),
             spur_table(name, self.mesh_table(faults)),
             faults,
-            sound_teeth(self.pair, self.modification),
+            sound_teeth(self.pair, law.modification),
             n_positions=n_positions,
             points_per_tooth=points_per_tooth,
         )
 
-    def require_drive(self) -> None:
-        """Raise unless at least one pair is always in contact, by the overlap of the face too."""
-        require_drive(self.pair, self.slices)
-
     def check(self) -> None:
         """Raise for what would stop every record."""
-        self.require_drive()
+        require_drive(self.pair, self.slices)
         check_sensing(self, lateral=self.engine.drive.lateral)
         check_solver(self.mesh, self.solver)
         warn_of_supports(self.engine, self.mesh_forces)

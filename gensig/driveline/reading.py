@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from gensig.driveline.engine_line import EngineLine, read_engine_line
+from gensig.driveline.hot_line import hot_line
 from gensig.driveline.machine import LineMachine
 from gensig.dynamics.integrator import Solver
 from gensig.errors import ConfigError
@@ -27,11 +28,6 @@ def read_line_machine(config: Configuration) -> LineMachine:
     """
     engine = read_engine_line(_with_lateral_motion(config))
     mesh_number = _record_mesh(engine)
-    if read_heat(config).is_any:
-        raise ConfigError(
-            "heat: a drive line has gears as they are drawn; take heat=none, or "
-            "system=helical_pair with the gears of one of its meshes, spur gears too"
-        )
     operating, quality = (
         read_operating(config.section("operating")),
         read(Quality, config.section("quality"), "quality"),
@@ -48,11 +44,15 @@ def read_line_machine(config: Configuration) -> LineMachine:
         slices=read_slice_options(config.section("mesh")),
         modification=read_modification(config),
     )
-    return replace(
+    machine = replace(
         machine,
         operating=replace(operating, speed=operating.speed * machine.ratio),
         sensing=machine.sensing.of_machine(machine.channels),
     )
+    heat = read_heat(config)
+    if heat.is_any:
+        return hot_line(machine, heat)
+    return machine
 
 
 def _with_lateral_motion(config: Configuration) -> Configuration:

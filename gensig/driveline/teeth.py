@@ -35,6 +35,7 @@ from gensig.mesh.options import MeshOptions, SliceOptions
 from gensig.mesh.pair_table import PairTable, node_positions
 from gensig.mesh.sliced.sliced_table import SlicedTable, sliced_table
 from gensig.mesh.sliced.slices import slice_middles
+from gensig.mesh.thermal.thermal_growth import PairGrowth
 from gensig.sensing.manufacturing import GearErrors, Specimen
 from gensig.systems.base import home_meshes
 from gensig.systems.run import Start
@@ -49,16 +50,38 @@ FORCES_PER_OCTAVE = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class MeshHeat:
+    """Effects of heat on the teeth of a mesh.
+
+    ``material`` at their temperature, ``growth`` of its gears or None.
+    """
+
+    material: Material
+    growth: PairGrowth | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ToothLaw:
     """Material, conventions and slices of all teeth of a line.
 
-    ``modification`` is that of the followed mesh, see ``modified_there``.
+    ``modification`` is that of the followed mesh, see ``modified_there``. ``heat`` (mesh,) has
+    None for meshes without effects; it is empty for a cold line.
     """
 
     material: Material
     options: MeshOptions
     slices: SliceOptions
     modification: PairModification = PLAIN
+    heat: tuple[MeshHeat | None, ...] = ()
+
+    def at_mesh(self, number: int) -> ToothLaw:
+        """The law of one mesh, with the effects of heat there."""
+        law = replace(self, heat=())
+        effects = self.heat[number] if self.heat else None
+        if effects is None:
+            return law
+        hot = replace(self.modification, growth=effects.growth)
+        return replace(law, material=effects.material, modification=hot)
 
     def flanks(self, pair: GearPair, force: float) -> SlicedPair:
         """A pair at rest under a mean force in N, in slices."""
@@ -159,6 +182,7 @@ def _table_in_line(
     force: float,
 ) -> PairTable | SlicedTable:
     pair, force = machine.drive.pairs[number], reference_force(machine, number, force)
+    law = law.at_mesh(number)
     require_drive(pair, law.slices)
     if pair.pinion.helix_angle:
         force = 2.0 ** (
