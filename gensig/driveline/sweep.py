@@ -14,14 +14,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.driveline.cycle_statistics import (
+from gensig.driveline.engine_line import EngineLine
+from gensig.driveline.excitation.cycle import CYCLE
+from gensig.driveline.excitation.cycle_statistics import (
     fluctuations,
     order_amplitudes,
     typical_extremes,
     without_trend,
 )
-from gensig.driveline.engine_line import EngineLine
-from gensig.driveline.excitation.cycle import CYCLE
 from gensig.driveline.in_time import (
     GOVERNOR,
     RATE,

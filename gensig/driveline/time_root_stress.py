@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.driveline.cycle_statistics import typical_extremes, whole_cycles
 from gensig.driveline.engine_dampers import (
     DynamicRootStress,
     crank_of_passes,
@@ -18,6 +17,7 @@ from gensig.driveline.engine_dampers import (
 )
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.cycle import CYCLE
+from gensig.driveline.excitation.cycle_statistics import typical_extremes, whole_cycles
 from gensig.driveline.in_time import TimeResponse
 from gensig.errors import ConfigError
 from gensig.systems.root_strength import RootStrength

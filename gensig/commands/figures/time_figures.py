@@ -23,10 +23,10 @@ from gensig.commands.figures.style import (
     zero_line,
 )
 from gensig.commands.lines.results import RPM, ResponseResult, roll_degrees
-from gensig.driveline.cycle_statistics import typical_extremes
 from gensig.driveline.engine_dampers import passes_of_a_cycle
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.cycle import CYCLE
+from gensig.driveline.excitation.cycle_statistics import typical_extremes
 from gensig.driveline.in_time import TimeResponse
 from gensig.driveline.linear.forced import over_cycle
 from gensig.driveline.sweep import Sweep, SweepWay, amplitude_spectra

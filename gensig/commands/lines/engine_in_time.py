@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from gensig.commands.lines.results import MPA, RPM, strength_content
-from gensig.driveline.cycle_statistics import (
+from gensig.driveline.engine_dampers import DynamicRootStress, passes_of_a_cycle
+from gensig.driveline.engine_line import EngineLine, read_engine_line
+from gensig.driveline.excitation.cycle_statistics import (
     fluctuations,
     order_amplitudes,
     typical_extremes,
 )
-from gensig.driveline.engine_dampers import DynamicRootStress, passes_of_a_cycle
-from gensig.driveline.engine_line import EngineLine, read_engine_line
 from gensig.driveline.excitation.line_torques import LineTorques
 from gensig.driveline.in_time import TimeResponse, tabulated_meshes, time_response
 from gensig.driveline.sweep import Sweep, SweepWay, sweep_response

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gensig.driveline.cycle_statistics import (
+from gensig.driveline.excitation.cycle_statistics import (
     fluctuations,
     order_amplitudes,
     typical_extremes,

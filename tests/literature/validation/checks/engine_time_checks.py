@@ -16,11 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.driveline.cycle_statistics import (
-    fluctuations,
-    order_amplitudes,
-    typical_extremes,
-)
 from gensig.driveline.engine_dampers import (
     DynamicRootStress,
     mesh_between,
@@ -28,6 +23,11 @@ from gensig.driveline.engine_dampers import (
     read_mesh_strength,
 )
 from gensig.driveline.engine_line import EngineLine, read_engine_line
+from gensig.driveline.excitation.cycle_statistics import (
+    fluctuations,
+    order_amplitudes,
+    typical_extremes,
+)
 from gensig.driveline.in_time import TimeResponse, tabulated_meshes, time_response
 from gensig.driveline.time_root_stress import root_stress_in_time, typical_largest
 from gensig.options.compose import compose
