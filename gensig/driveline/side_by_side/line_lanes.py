@@ -96,7 +96,8 @@ def _meshes(
         "tooth_tilt": joined("tooth_tilt"),
         "one_sided": True,
         "consistent": first.pairs[0].table.options.roll_torque == "consistent",
-        "touched": first.touched.ravel(),
+        # a gear that does not move has no reach: any degree of freedom stands for its own
+        "touched": np.maximum(first.touched, 0).ravel(),
         "reach": _side_by_side(np.stack([lane.reach for lane in lanes]), precision),
         "slide": _side_by_side(np.stack([lane.slide for lane in lanes]), precision),
     }
@@ -118,14 +119,14 @@ def _machines(
     stiffness = np.stack([line.stiffness for line in lines_of]) - rigid
     damping = np.stack([line.damping for line in lines_of])
     damping = damping - slowed[:, None, None] * rigid
-    sprung, damped = _couplings(stiffness), _couplings(damping)
+    row, column = _coupled(stiffness, damping)
     turning = rotation[:, lanes[0].touched[:, lines.A_TURN]]
     rows = {
         "inverse_mass": 1.0 / mass,
         "stiffness": np.einsum("lii->li", stiffness),
         "damping": np.einsum("lii->li", damping),
-        "sprung": sprung.value,
-        "damped": damped.value,
+        "sprung": stiffness[:, row, column],
+        "damped": damping[:, row, column],
         "rotation": rotation,
         "held": held,
         "held_damping": slowed[:, None],
@@ -133,10 +134,7 @@ def _machines(
     }
     return {
         **{name: _side_by_side(values, precision) for name, values in rows.items()},
-        "sprung_first": sprung.first,
-        "sprung_column": sprung.column,
-        "damped_first": damped.first,
-        "damped_column": damped.column,
+        "coupled": np.stack([row, column], axis=-1).ravel(),
         "turning": turning.T.ravel(),
         "turning_dofs": np.flatnonzero(rotation.any(axis=0)),
         "exact_rotation": rotation.T.ravel(),
@@ -154,29 +152,17 @@ def _held_at(lanes: Sequence[LineDynamics], rests: Array) -> Array:
     return np.stack(held)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Couplings:
-    """Entries of matrices beside their diagonals, row after row.
-
-    ``first`` (row + 1,), ``column`` (entry,), ``value`` (lane, entry).
+def _coupled(*matrices: Array) -> tuple[Index, Index]:
+    """Rows and columns, the lower number first, of what symmetric matrices (lane, row, column)
+    hold beside their diagonals, but for what is rounded.
     """
-
-    first: Index
-    column: Index
-    value: Array
-
-
-def _couplings(matrices: Array) -> Couplings:
-    """Entries beside the diagonals of matrices (lane, row, column), but for what is rounded."""
-    diagonal = np.sqrt(np.abs(np.einsum("lii->li", matrices)))
-    least = ROUNDED * diagonal[:, :, None] * diagonal[:, None, :]
-    is_entry = np.any(np.abs(matrices) > least, axis=0)
-    np.fill_diagonal(is_entry, False)
-    row, column = np.nonzero(is_entry)
-    first = np.searchsorted(row, np.arange(matrices.shape[1] + 1))
-    return Couplings(
-        first=first, column=column, value=np.ascontiguousarray(matrices[:, row, column])
-    )
+    is_entry = np.zeros(matrices[0].shape[1:], dtype=np.bool_)
+    for matrix in matrices:
+        diagonal = np.sqrt(np.abs(np.einsum("lii->li", matrix)))
+        least = ROUNDED * diagonal[:, :, None] * diagonal[:, None, :]
+        is_entry |= np.any(np.abs(matrix) > least, axis=0)
+    row, column = np.nonzero(np.triu(is_entry, 1))
+    return row, column
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

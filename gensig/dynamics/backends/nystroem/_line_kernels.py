@@ -26,36 +26,41 @@ from gensig.dynamics._vector import (
 )
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem import _line_layout as lines
+from gensig.dynamics.backends.nystroem._flat import number_at
 from gensig.dynamics.backends.nystroem._kernels import RECENTER, choose, write_mesh
 from gensig.dynamics.backends.nystroem._kinks import (
     kinked,
 )
 from gensig.dynamics.backends.nystroem._law import mesh_law
-from gensig.dynamics.backends.nystroem._layout import FOLLOWED, block
+from gensig.dynamics.backends.nystroem._layout import FOLLOWED
 from gensig.dynamics.backends.nystroem._line_layout import (
     LineGroup,
     machine_rows,
     mesh_of,
     mesh_rows,
+    of,
     wide_rows,
 )
 from gensig.dynamics.backends.nystroem._line_meshes import (
     acceleration,
     correct,
+    couple,
     govern,
     law_at,
     mesh_mobility,
     motion,
+    own_pull,
     push,
     ratio,
     rolled,
+    touched,
     turning_speed,
 )
 from gensig.dynamics.backends.nystroem._motion import (
     DAMPER_SHARE,
     conclude,
-    go_to_middle,
     predict,
+    to_middle,
 )
 from gensig.dynamics.backends.nystroem._pairs import (
     first_pairs,
@@ -95,8 +100,6 @@ def integrate(
     n_dof, n_meshes = len(group.force) // n, group.n_meshes
     n_channels = len(channels) if out_row >= 0 else 0
     machine = machine_rows(work, n_meshes, n)
-    q, v = block(rows.Q, n_dof), block(rows.V, n_dof)
-    mean = block(rows.MEAN, n_dof)
     changing = len(group.profile) > (lines.N_PROFILE + 2 * n_dof) * n
     begin(group, step, state, work)
     by_tooth, starting = False, False
@@ -128,34 +131,36 @@ def integrate(
             angle_row += 1
         for m in range(n_meshes):
             read_mesh(group, m, step, by_tooth, lost, machine, work, wide)
-        go_to_middle(step, n_dof, n_dof, machine)
-        clear(n_dof, machine)
+        for d in range(n_dof):
+            moved, rate = to_middle(d * lines.N_BLOCKS, step, 1, machine)
+            own_pull(group, d, moved, rate, machine)
+        couple(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
+        govern(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
         for m in range(n_meshes):
             push_middle(group, m, step, machine, work, wide)
-        middle = block(rows.MIDDLE_Q, n_dof), block(rows.MIDDLE_V, n_dof)
-        govern(group, middle[0], middle[1], machine)
         for d in range(n_dof):
-            a = acceleration(group, d, middle[0], middle[1], machine)
-            predict(d, a, step, n_dof, machine)
-        clear(n_dof, machine)
+            a = acceleration(group, d, machine)
+            moved, rate = predict(d * lines.N_BLOCKS, a, step, 1, machine)
+            own_pull(group, d, moved, rate, machine)
+        couple(group, rows.END_Q, rows.END_V, machine)
+        govern(group, rows.END_Q, rows.END_V, machine)
         for m in range(n_meshes):
             push_end(group, m, step, machine, work, wide)
-        end = block(rows.END_Q, n_dof), block(rows.END_V, n_dof)
-        govern(group, end[0], end[1], machine)
         for d in range(n_dof):
-            a = acceleration(group, d, end[0], end[1], machine)
-            conclude(d, a, step, n_dof, machine)
+            a = acceleration(group, d, machine)
+            conclude(d * lines.N_BLOCKS, a, step, 1, machine)
         for m in range(n_meshes):
             end_mesh(group, m, step, machine, work)
         gain = get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
         out_first = (out_row + number - first_step) * n_channels
         for c in range(n_channels):
-            carried = gain * get_row(group.rotation, channels[c])
-            value = get_row(machine, mean + channels[c]) + carried
+            d = number_at(channels, c)
+            carried = gain * get_row(group.rotation, d)
+            value = get_row(machine, of(rows.MEAN, d)) + carried
             set_row(out, out_first + c, value)
     for d in range(n_dof):
-        set_row(state, d, get_row(machine, q + d))
-        set_row(state, n_dof + d, get_row(machine, v + d))
+        set_row(state, d, get_row(machine, of(rows.Q, d)))
+        set_row(state, n_dof + d, get_row(machine, of(rows.V, d)))
     return angle_row
 
 
@@ -169,8 +174,8 @@ def begin(group, step, state, work):
     n_dof, n_meshes = len(group.force) // n, group.n_meshes
     machine = machine_rows(work, n_meshes, n)
     for d in range(n_dof):
-        set_row(machine, block(rows.Q, n_dof) + d, get_row(state, d))
-        set_row(machine, block(rows.V, n_dof) + d, get_row(state, n_dof + d))
+        set_row(machine, of(rows.Q, d), get_row(state, d))
+        set_row(machine, of(rows.V, d), get_row(state, n_dof + d))
     for m in range(n_meshes):
         mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
         turn = 1.0 / get_row(mesh.numbers, layout.PER_FRICTION_WIDTH)
@@ -189,15 +194,16 @@ def recenter(group, machine, wide):
     """
     n = width(machine)
     n_dof = len(group.force) // n
-    q = block(rows.Q, n_dof)
-    turn = get_row(machine, q + group.reference)
+    reference = of(rows.Q, group.reference)
+    turn = get_row(machine, reference)
     for first in range(0, n, EIGHT):
-        turned = load_wide(machine, at(q + group.reference, first, n))
+        turned = load_wide(machine, at(reference, first, n))
         center = load_wide(wide, at(layout.CENTER, first, n))
         store(wide, at(layout.CENTER, first, n), center + turned)
     for d in range(n_dof):
         moved = turn * get_row(group.rotation, d)
-        set_row(machine, q + d, get_row(machine, q + d) - moved)
+        place = of(rows.Q, d)
+        set_row(machine, place, get_row(machine, place) - moved)
 
 
 @inlined
@@ -225,8 +231,7 @@ def set_rolls(group, time, machine, wide):
         turned = turned + load_wide(wide, at(layout.CENTER, first, n))
         store(wide, at(layout.NOMINAL, first, n), turned)
         for m in range(n_meshes):
-            turn = lines.N_TOUCHED * m + lines.A_TURN
-            own = block(rows.Q, n_dof) + group.touched[turn]
+            own = of(rows.Q, touched(group, m, lines.A_TURN))
             roll = turned * load_wide(group.turning, at(m, first, n))
             roll = roll + load_wide(machine, at(own, first, n))
             exact = m * layout.N_EXACT
@@ -250,14 +255,13 @@ def set_forces(group, time, machine, wide):
     set_row(machine, rows.DRIVE + layout.DRIVE_CENTER, center)
     set_row(machine, rows.DRIVE + layout.DRIVE_SPEED, speed + since * gain)
     set_row(machine, rows.DRIVE + layout.DRIVE_GAIN, gain)
-    forces = block(rows.FORCES, n_dof)
     for d in range(n_dof):
         given = get_row(group.force, d) - gain * get_row(group.carried, d)
         if len(profile) > n_rows * n:
             row = cell + lines.N_PROFILE + 2 * d
             given = given + _in_row(profile, row, machine)
             given = given + since * _in_row(profile, row + 1, machine)
-        set_row(machine, forces + d, given)
+        set_row(machine, of(rows.FORCES, d), given)
 
 
 @inlined
@@ -275,15 +279,19 @@ def start(group, fresh, by_tooth, work, wide):
     n = width(work)
     n_dof, n_meshes = len(group.force) // n, group.n_meshes
     machine = machine_rows(work, n_meshes, n)
-    clear(n_dof, machine)
     zero = spread(work, 0.0)
+    q, v = rows.Q, rows.V
+    for d in range(n_dof):
+        moved, rate = get_row(machine, of(q, d)), get_row(machine, of(v, d))
+        own_pull(group, d, moved, rate, machine)
+    couple(group, rows.Q, rows.V, machine)
+    govern(group, rows.Q, rows.V, machine)
     for m in range(n_meshes):
         mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
         own_wide = wide_rows(wide, m, n)
         first_pairs(mesh, fresh, own, own_wide)
         for j in range(FOLLOWED):
             read_begin(mesh, by_tooth, j, own, own_wide)
-        q, v = block(rows.Q, n_dof), block(rows.V, n_dof)
         approach, rate = motion(group, m, q, v, machine)
         speed = turning_speed(group, m, v, zero, machine)
         kept = (
@@ -314,24 +322,21 @@ def start(group, fresh, by_tooth, work, wide):
             force = where_above(flags, zero, force, kept[j])
             set_row(own, rows.PAIR_FORCE + j, force)
     flags = get_row(machine, rows.FRESH)
-    q, v = block(rows.Q, n_dof), block(rows.V, n_dof)
-    govern(group, q, v, machine)
     for d in range(n_dof):
-        a = acceleration(group, d, q, v, machine)
-        choose(flags, block(rows.NOW, n_dof) + d, a, machine)
-        choose(flags, block(rows.HALFWAY, n_dof) + d, a, machine)
-        choose(flags, block(rows.BEFORE, n_dof) + d, a, machine)
+        a = acceleration(group, d, machine)
+        choose(flags, of(rows.NOW, d), a, machine)
+        choose(flags, of(rows.HALFWAY, d), a, machine)
+        choose(flags, of(rows.BEFORE, d), a, machine)
 
 
 @inlined
 def write_angles(group, angle, row, machine, wide):
     """Write the angles of a group at the begin of a step."""
     n = width(machine)
-    n_dof = len(group.force) // n
     n_angles = len(group.angles)
     for k in range(n_angles):
-        d = group.angles[k]
-        own = block(rows.Q, n_dof) + d
+        d = number_at(group.angles, k)
+        own = of(rows.Q, d)
         for first in range(0, n, EIGHT):
             turned = load_wide(wide, at(layout.NOMINAL, first, n))
             turned = turned * load_wide(group.exact_rotation, at(d, first, n))
@@ -340,18 +345,9 @@ def write_angles(group, angle, row, machine, wide):
 
 
 @inlined
-def clear(n_dof, machine):
-    """Set the forces of all meshes to 0."""
-    zero = spread(machine, 0.0)
-    for d in range(n_dof):
-        set_row(machine, block(lines.ON, n_dof) + d, zero)
-
-
-@inlined
 def read_mesh(group, m, step, by_tooth, lost, machine, work, wide):
     """Read the tables of a mesh at the end of the step and set its nodes."""
     n = width(work)
-    n_dof = len(group.force) // n
     mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
     own_wide = wide_rows(wide, m, n)
     zero, one = spread(work, 0.0), spread(work, 1.0)
@@ -361,10 +357,10 @@ def read_mesh(group, m, step, by_tooth, lost, machine, work, wide):
     if locate(mesh, own, own_wide):
         take_pairs(mesh, by_tooth, own, own_wide)
     # the roll at the end of the step, with every force in it
-    now, v = block(rows.NOW, n_dof), block(rows.V, n_dof)
-    d = group.touched[m * lines.N_TOUCHED + lines.A_TURN]
+    now, v = rows.NOW, rows.V
+    d = touched(group, m, lines.A_TURN)
     gain = ratio(group, m, machine) * get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
-    gain = gain + get_row(machine, now + d)
+    gain = gain + get_row(machine, of(now, d))
     speed = turning_speed(group, m, v, zero, machine) + (0.5 * step) * gain
     radius = get_row(mesh.numbers, layout.PINION_RADIUS)
     ahead, behind = step * radius * speed, get_row(own, rows.BEHIND)
@@ -373,15 +369,14 @@ def read_mesh(group, m, step, by_tooth, lost, machine, work, wide):
     for j in range(FOLLOWED):
         read_step(mesh, by_tooth, j, ahead, span, per_span, own, own_wide)
     set_row(own, lines.AHEAD, ahead)
-    set_row(own, lines.BEGUN, get_row(machine, block(rows.Q, n_dof) + d))
+    set_row(own, lines.BEGUN, get_row(machine, of(rows.Q, d)))
 
 
 @inlined
 def push_middle(group, m, step, machine, work, wide):
     """Evaluate the law of a mesh in the middle of the step and add its forces."""
     n = width(work)
-    n_dof = len(group.force) // n
-    q, v = block(rows.MIDDLE_Q, n_dof), block(rows.MIDDLE_V, n_dof)
+    q, v = rows.MIDDLE_Q, rows.MIDDLE_V
     own = mesh_rows(work, m, n)
     turned = rolled(group, m, 0.5 * step, q, machine, own)
     ahead = get_row(own, lines.AHEAD)
@@ -408,8 +403,7 @@ def push_middle(group, m, step, machine, work, wide):
 def push_end(group, m, step, machine, work, wide):
     """Evaluate the law of a mesh at the end of the step and add its forces."""
     n = width(work)
-    n_dof = len(group.force) // n
-    q, v = block(rows.END_Q, n_dof), block(rows.END_V, n_dof)
+    q, v = rows.END_Q, rows.END_V
     own = mesh_rows(work, m, n)
     turned = rolled(group, m, step, q, machine, own)
     off = turned - get_row(own, lines.AHEAD)
@@ -425,12 +419,11 @@ def push_end(group, m, step, machine, work, wide):
 def end_mesh(group, m, step, machine, work):
     """Correct the end of the step for the kinks of a mesh, and shift what it remembers."""
     n = width(work)
-    n_dof = len(group.force) // n
     mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
     changed = kinked(0, own), kinked(1, own), kinked(2, own)
     if any_above(changed[0] + changed[1] + changed[2], spread(work, 0.0)):
         correct(group, mesh, m, step, changed, machine, own)
-    turned = rolled(group, m, step, block(rows.Q, n_dof), machine, own)
+    turned = rolled(group, m, step, rows.Q, machine, own)
     set_row(own, rows.BEHIND, get_row(own, lines.AHEAD) - turned)
     for j in range(FOLLOWED):
         margin = get_row(own, rows.MARGIN + rows.END_AT * FOLLOWED + j)

@@ -1,7 +1,7 @@
 """Row names of the two-evaluation core for machines of several meshes.
 
-The scratch holds the rows of every mesh, ``N_FIXED`` each, and then blocks of the machine with one
-row per degree of freedom. Rows of the drive are those of the last mesh.
+The scratch holds the rows of every mesh, ``N_FIXED`` each, and then the ``N_BLOCKS`` rows of every
+degree of freedom. Rows of the drive are those of the last mesh.
 """
 
 from __future__ import annotations
@@ -12,10 +12,13 @@ import numpy as np
 
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._layout import COLUMNS
-from gensig.dynamics._vector import inlined, n_lanes
+from gensig.dynamics._vector import n_lanes
+from gensig.dynamics._written import written
 from gensig.dynamics.backends.nystroem import _layout as rows
+from gensig.dynamics.backends.nystroem._flat import tail
+from gensig.dynamics.backends.nystroem._layout import block
 
-# block behind those of a pair: forces of all meshes on the machine
+# block behind those of a pair: all forces on the machine
 ON = rows.N_BLOCKS
 N_BLOCKS = ON + 1
 # rows of a mesh, which one pair holds in registers: roll over the step at whose end the nodes were
@@ -41,13 +44,14 @@ class LineGroup(NamedTuple):
     The machine is M q'' + C q' + K q = f + mesh forces; q is the deviation from nominal rotation.
     The state is q less ``rest`` (dof, lane). ``touched`` (mesh, 6) are the degrees of freedom of a
     mesh, ``reach`` (mesh, 6, lane) is the gradient of its approach along them, ``slide``
-    (mesh, 6, lane) the direction of its friction. ``turning`` (mesh, lane) is the rotation of gear
+    (mesh, 6, lane) the direction of its friction; where a gear does not move both are 0, and the
+    first degree of freedom stands there. ``turning`` (mesh, lane) is the rotation of gear
     a with the reference, in float64 like ``exact_rotation`` (dof, lane). ``force`` (dof, lane) is
     what holds neither rest nor mean mesh forces; ``profile`` (cell, row, lane) holds the nominal
     motion of the reference and the forces that come with it. ``reference`` is the degree of
     freedom whose rotation is 1, ``angles`` those whose angles are given out. ``stiffness`` and
-    ``damping`` are diagonals; their other entries (entry, lane) are ``sprung`` and ``damped``, row
-    after row as ``sprung_first`` (dof + 1,) and ``sprung_column`` say, and alike. The governor is
+    ``damping`` are diagonals; their other entries (entry, lane) are ``sprung`` and ``damped``, of
+    the degrees of freedom ``coupled`` (entry, 2), each pair once. The governor is
     no part of them: its stiffness is ``held`` (dof, lane) times ``held``, its damping
     ``held_damping`` (lane,) s times as much, on ``turning_dofs``. Other fields are those of
     ``Group``.
@@ -71,11 +75,8 @@ class LineGroup(NamedTuple):
     inverse_mass: Any
     stiffness: Any
     damping: Any
-    sprung_first: Any
-    sprung_column: Any
+    coupled: Any
     sprung: Any
-    damped_first: Any
-    damped_column: Any
     damped: Any
     force: Any
     rest: Any
@@ -107,17 +108,21 @@ class Mesh(NamedTuple):
     consistent: bool
 
 
-@inlined
+@written
+def of(name, d):
+    """Row of a degree of freedom in the scratch of the machine, by the name of its block."""
+    return block(name, 1) + d * N_BLOCKS
+
+
+@written
 def mesh_of(group, m, n):
     """Mesh ``m`` of a group of ``n`` lanes; views, not copies."""
-    numbers, exact = m * layout.N_NUMBERS * n, m * layout.N_EXACT * n
-    indices, bend = m * layout.N_INDICES * n, m * COLUMNS * n
     return Mesh(
-        group.numbers[numbers : numbers + layout.N_NUMBERS * n],
-        group.exact[exact : exact + layout.N_EXACT * n],
-        group.indices[indices : indices + layout.N_INDICES * n],
+        tail(group.numbers, m * (layout.N_NUMBERS * n)),
+        tail(group.exact, m * (layout.N_EXACT * n)),
+        tail(group.indices, m * (layout.N_INDICES * n)),
         group.table,
-        group.bend[bend : bend + COLUMNS * n],
+        tail(group.bend, m * (COLUMNS * n)),
         group.tooth_row,
         group.tooth_error,
         group.tooth_tilt,
@@ -126,22 +131,22 @@ def mesh_of(group, m, n):
     )
 
 
-@inlined
+@written
 def mesh_rows(work, m, n):
     """Rows of one mesh in the scratch; a view."""
-    return work[m * rows.N_FIXED * n : (m + 1) * rows.N_FIXED * n]
+    return tail(work, m * (rows.N_FIXED * n))
 
 
-@inlined
+@written
 def wide_rows(wide, m, n):
     """Rows of one mesh in the float64 scratch; a view."""
-    return wide[m * rows.N_WIDE * n : (m + 1) * rows.N_WIDE * n]
+    return tail(wide, m * (rows.N_WIDE * n))
 
 
-@inlined
+@written
 def machine_rows(work, n_meshes, n):
     """Rows of the machine: ``N_FIXED`` of its last mesh, and its blocks; a view."""
-    return work[(n_meshes - 1) * rows.N_FIXED * n :]
+    return tail(work, (n_meshes - 1) * (rows.N_FIXED * n))
 
 
 def line_scratch(n_meshes, n_dof, precision="float64"):

@@ -12,100 +12,84 @@ from gensig.dynamics._vector import (
     spread,
     width,
 )
+from gensig.dynamics._written import written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem import _line_layout as lines
+from gensig.dynamics.backends.nystroem._flat import number_at
 from gensig.dynamics.backends.nystroem._kinks import add_force, miss, missed_law
 from gensig.dynamics.backends.nystroem._law import mesh_law
-from gensig.dynamics.backends.nystroem._layout import block
 from gensig.dynamics.backends.nystroem._line_layout import (
     mesh_of,
     mesh_rows,
+    of,
     wide_rows,
 )
 
 
-@inlined
+@written
 def motion(group, m, q, v, machine):
     """Approach of a mesh and its rate, from the rows of a state."""
-    approach = _rest_approach(group, m, machine)
-    rate = spread(machine, 0.0)
+    row = m * layout.N_NUMBERS + layout.REST_APPROACH
+    approach, rate = get_row(group.numbers, row), spread(machine, 0.0)
     for k in range(lines.N_TOUCHED):
-        place = m * lines.N_TOUCHED + k
-        d = group.touched[place]
-        if d >= 0:
-            reach = get_row(group.reach, place)
-            approach = fused(reach, get_row(machine, q + d), approach)
-            rate = fused(reach, get_row(machine, v + d), rate)
+        d, reach = touched(group, m, k), get_row(group.reach, m * lines.N_TOUCHED + k)
+        approach = fused(reach, get_row(machine, of(q, d)), approach)
+        rate = fused(reach, get_row(machine, of(v, d)), rate)
     return approach, rate
 
 
-@inlined
+@written
+def touched(group, m, k):
+    """One of the degrees of freedom that a mesh acts on."""
+    return number_at(group.touched, m * lines.N_TOUCHED + k)
+
+
+@written
 def mesh_mobility(group, m, machine):
     """Acceleration of the approach of a mesh by its own force, 1/kg."""
     moved = spread(machine, 0.0)
     for k in range(lines.N_TOUCHED):
-        place = m * lines.N_TOUCHED + k
-        d = group.touched[place]
-        if d >= 0:
-            reach = get_row(group.reach, place)
-            moved = fused(reach * reach, get_row(group.inverse_mass, d), moved)
+        reach = get_row(group.reach, m * lines.N_TOUCHED + k)
+        mass = get_row(group.inverse_mass, touched(group, m, k))
+        moved = fused(reach * reach, mass, moved)
     return moved
 
 
-@inlined
-def _rest_approach(group, m, machine):
-    row = m * layout.N_NUMBERS + layout.REST_APPROACH
-    return get_row(group.numbers, row)
-
-
-@inlined
+@written
 def turning_speed(group, m, v, since, machine):
     """Speed of gear a of a mesh, ``since`` s after the begin of the step, rad/s."""
     speed = get_row(machine, rows.DRIVE + layout.DRIVE_SPEED)
     speed = speed + since * get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
-    d = group.touched[m * lines.N_TOUCHED + lines.A_TURN]
-    return fused(ratio(group, m, machine), speed, get_row(machine, v + d))
+    d = touched(group, m, lines.A_TURN)
+    return fused(ratio(group, m, machine), speed, get_row(machine, of(v, d)))
 
 
-@inlined
+@written
 def ratio(group, m, machine):
     """Rotation of gear a of a mesh with the reference."""
-    return get_row(group.rotation, group.touched[m * lines.N_TOUCHED + lines.A_TURN])
+    return get_row(group.rotation, touched(group, m, lines.A_TURN))
 
 
-@inlined
+@written
 def push(group, m, law, machine):
     """Add the forces of a mesh to the rows ``ON``."""
-    n_dof = len(group.force) // width(machine)
-    on = block(lines.ON, n_dof)
-    mesh = mesh_of(group, m, width(machine))
-    normal = law.normal - get_row(mesh.numbers, layout.MEAN_FORCE)
-    law = layout.Law(
-        normal,
-        law.friction,
-        law.moment_p,
-        law.moment_w,
-        law.along,
-        law.stored,
-        law.lost,
-        law.loaded,
-    )
+    row = m * layout.N_NUMBERS + layout.MEAN_FORCE
+    normal = law.normal - get_row(group.numbers, row)
     for k in range(lines.N_TOUCHED):
-        place = m * lines.N_TOUCHED + k
-        d = group.touched[place]
-        if d >= 0:
-            force = _on_body(group, mesh, place, k, law)
-            set_row(machine, on + d, get_row(machine, on + d) + force)
+        d = touched(group, m, k)
+        force = _on_body(group, m, k, normal, law)
+        pushed = of(lines.ON, d)
+        set_row(machine, pushed, get_row(machine, pushed) + force)
 
 
-@inlined
+@written
 def rolled(group, m, since, q, machine, own):
     """Roll of a mesh since the begin of the step, ``since`` s after it, m."""
-    d = group.touched[m * lines.N_TOUCHED + lines.A_TURN]
     speed = get_row(machine, rows.DRIVE + layout.DRIVE_SPEED)
     gain = get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
     turned = since * (speed + (0.5 * since) * gain) * ratio(group, m, machine)
-    moved = get_row(machine, q + d) - get_row(own, lines.BEGUN)
+    moved = get_row(machine, of(q, touched(group, m, lines.A_TURN)))
+    moved = moved - get_row(own, lines.BEGUN)
     row = m * layout.N_NUMBERS + layout.PINION_RADIUS
     return get_row(group.numbers, row) * (turned + moved)
 
@@ -135,30 +119,31 @@ def law_at(group, m, nodes, instant, off, turned, since, q, v, machine, work, wi
 @compiled
 def correct(group, mesh, m, step, changed, machine, own):
     """Add to the end of the step what the kinks of a mesh change, in the lanes with any."""
-    n_dof = len(group.force) // width(machine)
     miss(mesh.numbers, changed, own)
     any_changed = changed[0] + changed[1] + changed[2]
     short, early = missed_law(mesh, rows.SHORT, own), missed_law(mesh, rows.EARLY, own)
+    _correct(group, m, short, 1.0, any_changed, rows.MEAN, machine)
+    _correct(group, m, short, step, any_changed, rows.V, machine)
+    _correct(group, m, early, step * step, any_changed, rows.Q, machine)
+
+
+@written
+def _correct(group, m, law, by, changed, target, machine):
+    """Add accelerations by a law, times a number, to rows of what the mesh touches."""
     for k in range(lines.N_TOUCHED):
-        place = m * lines.N_TOUCHED + k
-        d = group.touched[place]
-        if d >= 0:
-            force = _on_body(group, mesh, place, k, short)
-            mean, v = block(rows.MEAN, n_dof), block(rows.V, n_dof)
-            add_force(group, d, force, 1.0, any_changed, mean, machine)
-            add_force(group, d, force, step, any_changed, v, machine)
-            force = _on_body(group, mesh, place, k, early)
-            q = block(rows.Q, n_dof)
-            add_force(group, d, force, step * step, any_changed, q, machine)
+        force = _on_body(group, m, k, law.normal, law)
+        d = touched(group, m, k)
+        add_force(group, d, force, by, changed, of(target, d) - d, machine)
 
 
-@inlined
-def _on_body(group, mesh, place, k, law):
+@written
+def _on_body(group, m, k, normal, law):
     """Force of a mesh law on one of the degrees of freedom that the mesh touches."""
+    place = m * lines.N_TOUCHED + k
     force = get_row(group.slide, place) * law.friction
-    force = force - get_row(group.reach, place) * law.normal
+    force = force - get_row(group.reach, place) * normal
     if k == lines.A_TURN:
-        arm = get_row(mesh.numbers, layout.PINION_RADIUS)
+        arm = get_row(group.numbers, m * layout.N_NUMBERS + layout.PINION_RADIUS)
         force = force + (arm * law.along + law.moment_p)
     if k == lines.B_TURN:
         force = force + law.moment_w
@@ -172,28 +157,46 @@ def govern(group, q, v, machine):
     ``CENTER`` is the rigid motion that the state does not hold.
     """
     center = get_row(machine, rows.DRIVE + layout.DRIVE_CENTER)
-    slowed, pull = get_row(group.held_damping, 0), spread(machine, 0.0)
+    moved, slowed = spread(machine, 0.0), spread(machine, 0.0)
     for k in range(len(group.turning_dofs)):
-        d = group.turning_dofs[k]
-        moved = fused(center, get_row(group.rotation, d), get_row(machine, q + d))
-        moved = fused(slowed, get_row(machine, v + d), moved)
-        pull = fused(get_row(group.held, d), moved, pull)
+        d = number_at(group.turning_dofs, k)
+        held = get_row(group.held, d)
+        turned = fused(center, get_row(group.rotation, d), get_row(machine, of(q, d)))
+        moved = fused(held, turned, moved)
+        slowed = fused(held, get_row(machine, of(v, d)), slowed)
+    pull = fused(get_row(group.held_damping, 0), slowed, moved)
     set_row(machine, lines.PULL, pull)
 
 
+@written
+def own_pull(group, d, moved, rate, machine):
+    """Set the force on a degree of freedom but those of neighbours, governor and meshes."""
+    spring = get_row(group.stiffness, d) * moved
+    spring = fused(get_row(group.damping, d), rate, spring)
+    force = get_row(machine, of(rows.FORCES, d)) - spring
+    set_row(machine, of(lines.ON, d), force)
+
+
 @inlined
-def acceleration(group, d, q, v, machine):
-    """Acceleration of a degree of freedom under the forces of all meshes, with states in rows."""
-    n_dof = len(group.force) // width(machine)
-    spring = get_row(group.stiffness, d) * get_row(machine, q + d)
-    spring = fused(get_row(group.damping, d), get_row(machine, v + d), spring)
-    spring = fused(get_row(group.held, d), get_row(machine, lines.PULL), spring)
-    for k in range(group.sprung_first[d], group.sprung_first[d + 1]):
-        moved = get_row(machine, q + group.sprung_column[k])
-        spring = fused(get_row(group.sprung, k), moved, spring)
-    for k in range(group.damped_first[d], group.damped_first[d + 1]):
-        rate = get_row(machine, v + group.damped_column[k])
-        spring = fused(get_row(group.damped, k), rate, spring)
-    on_it = get_row(machine, block(lines.ON, n_dof) + d)
-    pull = get_row(machine, block(rows.FORCES, n_dof) + d) + (on_it - spring)
-    return pull * get_row(group.inverse_mass, d)
+def couple(group, states, rates, machine):
+    """Add the forces of springs and dampers between two degrees of freedom."""
+    for k in range(len(group.coupled) // 2):
+        a, b = number_at(group.coupled, 2 * k), number_at(group.coupled, 2 * k + 1)
+        _couple(group, k, a, b, states, rates, machine)
+
+
+@written
+def _couple(group, k, a, b, q, v, machine):
+    sprung, damped = get_row(group.sprung, k), get_row(group.damped, k)
+    for one, other in ((a, b), (b, a)):
+        spring = sprung * get_row(machine, of(q, other))
+        spring = fused(damped, get_row(machine, of(v, other)), spring)
+        pulled = of(lines.ON, one)
+        set_row(machine, pulled, get_row(machine, pulled) - spring)
+
+
+@written
+def acceleration(group, d, machine):
+    """Acceleration of a degree of freedom under all forces."""
+    pull = get_row(group.held, d) * get_row(machine, lines.PULL)
+    return (get_row(machine, of(lines.ON, d)) - pull) * get_row(group.inverse_mass, d)

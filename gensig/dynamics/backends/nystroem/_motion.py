@@ -53,25 +53,27 @@ def go_to_middle(step, n_dof, n_rows, work):
 
     Blocks have ``n_rows`` rows each.
     """
+    for d in range(n_dof):
+        to_middle(d, step, n_rows, work)
+
+
+@written
+def to_middle(d, step, n_rows, work):
+    """Set the state of one degree of freedom in the middle of the step; its place and speed."""
     q, v = block(rows.Q, n_rows), block(rows.V, n_rows)
     middle_q, middle_v = block(rows.MIDDLE_Q, n_rows), block(rows.MIDDLE_V, n_rows)
     now, before = block(rows.NOW, n_rows), block(rows.BEFORE, n_rows)
     halfway = block(rows.HALFWAY, n_rows)
-    rows_of = q, v, middle_q, middle_v, now, before, halfway
-    for d in range(n_dof):
-        _to_middle(d, step, rows_of, work)
-
-
-@written
-def _to_middle(d, step, rows_of, work):
-    q, v, middle_q, middle_v, now, before, halfway = rows_of
     a, last_m = get_row(work, now + d), get_row(work, halfway + d)
     last_a, rate = get_row(work, before + d), get_row(work, v + d)
     moved = fused(Q_BEFORE, last_a, fused(Q_HALFWAY, last_m, Q_NOW * a))
     moved = fused(step, moved, 0.5 * rate)
-    set_row(work, middle_q + d, fused(step, moved, get_row(work, q + d)))
+    moved = fused(step, moved, get_row(work, q + d))
+    set_row(work, middle_q + d, moved)
     gained = fused(V_BEFORE, last_a, fused(V_HALFWAY, last_m, V_NOW * a))
-    set_row(work, middle_v + d, fused(step, gained, rate))
+    rate = fused(step, gained, rate)
+    set_row(work, middle_v + d, rate)
+    return moved, rate
 
 
 @inlined
@@ -200,7 +202,10 @@ def _conclude(group, d, on_it, step, work):
 
 @written
 def predict(d, m, step, n_rows, work):
-    """Keep the acceleration in the middle, and predict the end, of one degree of freedom."""
+    """Keep the acceleration in the middle, and predict the end, of one degree of freedom.
+
+    Returns its place and speed there.
+    """
     halfway = block(rows.HALFWAY, n_rows) + d
     a, last_m = get_row(work, block(rows.NOW, n_rows) + d), get_row(work, halfway)
     set_row(work, halfway, m)
@@ -210,7 +215,9 @@ def predict(d, m, step, n_rows, work):
     set_row(work, block(rows.END_Q, n_rows) + d, moved)
     # a + 4 m + b with b = [m] - 3 a + 3 m
     gained = fused(7.0, m, fused(-2.0, a, last_m))
-    set_row(work, block(rows.END_V, n_rows) + d, fused(step * SIXTH, gained, rate))
+    rate = fused(step * SIXTH, gained, rate)
+    set_row(work, block(rows.END_V, n_rows) + d, rate)
+    return moved, rate
 
 
 @written

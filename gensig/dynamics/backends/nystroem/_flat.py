@@ -1,0 +1,35 @@
+"""Integers and tails of flat arrays, without the checks and counts of Numba's own."""
+
+from __future__ import annotations
+
+from numba.core import types
+
+from gensig.dynamics._written import intrinsic
+
+
+@intrinsic
+def tail(typing_context, array, first):
+    """A view of a flat array from ``first`` on, whose length is not set: rows have none.
+
+    A slice takes twenty instructions, as it also counts.
+    """
+
+    def build(context, builder, sig, args):
+        position = context.data_model_manager[sig.args[0]].get_field_position("data")
+        data = builder.extract_value(args[0], position)
+        moved = builder.gep(data, [args[1]])
+        return builder.insert_value(args[0], moved, position)
+
+    return array(array, types.intp), build
+
+
+@intrinsic
+def number_at(typing_context, numbers, place):
+    """An integer of a flat array at a place that is not negative."""
+
+    def build(context, builder, sig, args):
+        position = context.data_model_manager[sig.args[0]].get_field_position("data")
+        data = builder.extract_value(args[0], position)
+        return builder.load(builder.gep(data, [args[1]]))
+
+    return numbers.dtype(numbers, types.intp), build
