@@ -38,10 +38,13 @@ RK45_NUMPY, KERNEL, RECORDS = (
 GOALS = {
     "kernel float64 over scalar Numba": 2.3,
     "kernel float32 over scalar Numba": 4.0,
+    "two-evaluation core over scalar Numba, float64": 14.0,
+    "two-evaluation core over scalar Numba, float32": 22.0,
     "two-stage box over scalar Numba of a pair, float64": 7.0,
-    "end to end over solve_ivp RK45, NumPy around the law": 1000.0,
+    "end to end over solve_ivp RK45, NumPy around the law": 2000.0,
+    "end to end over ROSS run_time_response": 4000.0,
     "share of the kernel's rate reached, float64": 0.6,
-    "two workers over one, float64": 1.8,
+    "two workers over one, float64": 1.9,
 }
 
 
@@ -122,15 +125,19 @@ def ratios(
     }
     result = {name: value / rates[SCALAR] for name, value in result.items()}
     for precision in PRECISIONS:
+        pair = rates[NYSTROEM.format(precision)]
+        result[f"two-evaluation core over scalar Numba, {precision}"] = (
+            pair / rates[SCALAR]
+        )
         result[f"two-evaluation core over compiled core, {precision}"] = (
-            rates[NYSTROEM.format(precision)] / rates[KERNEL.format(precision)]
+            pair / rates[KERNEL.format(precision)]
         )
         box = rates[TWO_STAGE.format(precision)]
         result[f"two-stage box over scalar Numba of a pair, {precision}"] = (
             box / rates[SCALAR]
         )
         result[f"pair over two-stage box, two-evaluation core, {precision}"] = (
-            rates[NYSTROEM.format(precision)] / box
+            pair / box
         )
     end = ends["float64"][RECORDS]
     result["float32 over float64, end to end"] = ends["float32"][RECORDS] / end
