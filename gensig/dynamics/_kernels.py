@@ -162,11 +162,12 @@ def integrate(
         if is_helical(group):
             bent = get_row(numbers, layout.SHARED) * get_row(work, layout.LAST_TOTAL)
             set_row(work, layout.LOCAL, approach + 0.5 * step * rate - bent)
+        set_row(work, layout.FLAGS, one)
         if number == first_step:
+            set_row(work, AHEAD + begin, zero)
             gather(group, begin, True, work, wide, near)
         roll_ahead(end, work, wide)
         if gather(group, end, True, work, wide, near):
-            set_row(work, layout.FLAGS, one)
             gather(group, begin, False, work, wide, near)
         for lane in range(n):
             ahead = wide[at(ROLL + begin, lane, n)] - wide[at(BASE, lane, n)]
@@ -378,6 +379,7 @@ def law_at(group, motion, work, wide, near, law_rows):
     set_row(work, AHEAD + EVEN, zero)
     set_row(work, layout.TOTAL, zero)
     set_row(work, layout.MOST_DAMPER, spread(work, layout.UNLIMITED))
+    set_row(work, layout.FLAGS, spread(work, 1.0))
     helical = is_helical(group)
     for _ in range(ROUNDS):
         bent = get_row(group.numbers, layout.SHARED) * get_row(work, layout.TOTAL)

@@ -224,17 +224,21 @@ class Group(NamedTuple):
     cells_per_second: float
 
 
-class HelicalGroup(Group):
+class Helical:
     """Helical gears.
 
     A type of its own, so that spur gears are compiled without the code of helical ones.
     """
 
 
+class HelicalGroup(Group, Helical):
+    """Helical gear meshes of one kind side by side."""
+
+
 @intrinsic
 def is_helical(typing_context: Any, group: Any) -> Any:
     """True for a group of helical gears; a constant of the compiled code."""
-    answer = issubclass(group.instance_class, HelicalGroup)
+    answer = issubclass(group.instance_class, Helical)
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return context.get_constant(types.boolean, answer)

@@ -50,6 +50,10 @@ from gensig.dynamics._vector import (
 )
 from gensig.dynamics._written import written
 
+NEAR_CHORD = (
+    2e-7  # m: from the depth at which a chord begins, within which it may begin
+)
+
 
 @inlined
 def _find_teeth(group, lane, newest, work, near):
@@ -77,14 +81,17 @@ def _find_teeth(group, lane, newest, work, near):
         counts[CHORD + k] = 0
         rows[ERROR + k] = group.tooth_error[tooth_p] + group.tooth_error[tooth_w]
         rows[TILT + k] = group.tooth_tilt[tooth_p] + group.tooth_tilt[tooth_w]
+    for k in range(indices[layout.FOLLOWED], followed(group)):
+        counts[AT_PINION + k] = -1
 
 
 @compiled
 def gather(group, slot, renew, work, wide, near):
     """Read the tables at the rolls of a slot; true if a newest pair or a chord has changed.
 
-    Pairs are in fixed order, the newest first. ``renew`` looks for the newest pair and chooses
-    the chords; otherwise these stay, and only the lanes that ``FLAGS`` marks are read. The first
+    Pairs are in fixed order, the newest first. ``renew`` looks for the newest pair, and chooses
+    the chords in the lanes that ``FLAGS`` marks; otherwise these stay, and only such lanes are
+    read. The first
     span of a slot holds the pairs that were read in any lane; rows outside of it are stale. The
     second holds those that come near their mates: the others carry nothing.
     """
@@ -93,7 +100,8 @@ def gather(group, slot, renew, work, wide, near):
     changed = False
     first, last, near_first, near_last = MOST_PAIRS, 0, MOST_PAIRS, 0
     for lane in range(n):
-        if not renew and work[at(layout.FLAGS, lane, n)] == 0.0:
+        is_marked = work[at(layout.FLAGS, lane, n)] > 0.0
+        if not (renew or is_marked):
             continue
         roll = wide[at(layout.ROLL + slot, lane, n)]
         pitch = exact[at(layout.PITCH, lane, n)]
@@ -120,20 +128,21 @@ def gather(group, slot, renew, work, wide, near):
                 cell = min(max(int(x), 0), last_cell)
                 part, row = x - cell, cell * COLUMNS
                 if is_helical(group):
-                    if renew:
-                        p = pinion + row
-                        other = _choose(group, lane, k, p, part, position, work, near)
+                    if renew and is_marked:
+                        p, ahead = pinion + row, work[at(AHEAD + slot, lane, n)]
+                        other = _choose(
+                            group, lane, k, p, part, position, ahead, work, near
+                        )
                         changed = other or changed
-                    chord = near[at(CHORD + k, lane, n)]
-                    pinion += chord * group.indices[at(layout.CHORD_STRIDE, lane, n)]
-                    _read_chord(group, lane, k, pinion + row, part, work)
+                    stride = group.indices[at(layout.CHORD_STRIDE, lane, n)]
+                    pinion += near[at(CHORD + k, lane, n)] * stride
                 p, wheel = pinion + row, near[at(AT_WHEEL + k, lane, n)]
-                low = load_four(group.table, p)
-                high = load_four(group.table, p + COLUMNS)
                 if wheel >= 0:
-                    low = low + load_four(group.table, wheel + row)
-                    high = high + load_four(group.table, wheel + row + COLUMNS)
-                store(work, raw, _bent(group, lane, low, high, part))
+                    wheel += row
+                store(work, raw, _read(group, group.table, lane, p, wheel, part))
+                if is_helical(group):
+                    chord = _read(group, group.chord_table, lane, p, wheel, part)
+                    store(work, raw_index(RAW_CHORD, k, lane, n), chord)
                 first, last = min(first, k), max(last, k + 1)
                 offset = _offset(group, lane, k, position, work)
                 if work[raw + GAP] + work[at(ERROR + k, lane, n)] + offset < within:
@@ -162,6 +171,16 @@ def gather(group, slot, renew, work, wide, near):
     return changed
 
 
+@inlined
+def _read(group, table, lane, p, wheel, part):
+    """Values between two nodes, from table index ``p`` on; ``wheel``, if not negative, is added."""
+    low, high = load_four(table, p), load_four(table, p + COLUMNS)
+    if wheel >= 0:
+        low = low + load_four(table, wheel)
+        high = high + load_four(table, wheel + COLUMNS)
+    return _bent(group, lane, low, high, part)
+
+
 @written
 def _bent(group, lane, low, high, part):
     """Table values between two nodes, bent as their slopes say."""
@@ -179,34 +198,71 @@ def _offset(group, lane, k, position, work):
 
 
 @inlined
-def _choose(group, lane, k, p, part, position, work, near):
+def _choose(group, lane, k, p, part, position, ahead, work, near):
     """Set the chord of a pair from its penetration; true if it is another than before.
 
-    The penetration is into what the other pairs deflect, ``p`` the table index of the cell.
+    The penetration is into what the other pairs deflect, in the middle of the step at whose end
+    the tables are read, ``ahead`` m of roll after its begin. ``p`` is the table index of the cell.
+    Between nodes chords meet a little off their depths: near these the lower one holds up to where
+    their forces are equal, so that the force has no step.
     """
-    n = width(work)
-    step = group.table[p + COLUMNS + GAP] - group.table[p + GAP]
-    step_slope = group.table[p + COLUMNS + GAP_SLOPE] - group.table[p + GAP_SLOPE]
-    bend = part * (1.0 - part) * group.bend[lane * COLUMNS + GAP]
-    gap = group.table[p + GAP] + part * step - bend * step_slope
-    offset = _offset(group, lane, k, position, work)
-    gap = gap + work[at(ERROR + k, lane, n)] + offset
-    bite = work[at(layout.LOCAL, lane, n)] - gap
-    n_chords, chord = group.n_chords, 0
-    while chord + 1 < n_chords and bite > group.depth[lane * n_chords + chord + 1]:
+    n, n_chords = width(work), group.n_chords
+    bite, chord, first = (
+        _bite(group, lane, k, p, part, position, ahead, work),
+        0,
+        lane * n_chords,
+    )
+    while chord + 1 < n_chords and bite > group.depth[first + chord + 1]:
         chord += 1
+    upper = 0
+    if chord + 1 < n_chords and group.depth[first + chord + 1] - bite < NEAR_CHORD:
+        upper = chord + 1
+    elif chord > 0 and bite - group.depth[first + chord] < NEAR_CHORD:
+        upper = chord
+    if upper > 0:
+        stride = group.indices[at(layout.CHORD_STRIDE, lane, n)]
+        p_upper = p + upper * stride
+        p_lower = p_upper - stride
+        deep = _bite(group, lane, k, p_upper, part, position, ahead, work)
+        shallow = _bite(group, lane, k, p_lower, part, position, ahead, work)
+        soft = _own_compliance(group, lane, p_upper, part, ahead, work)
+        softer = _own_compliance(group, lane, p_lower, part, ahead, work)
+        chord = upper
+        if (deep * softer - shallow * soft) * (softer - soft) < 0.0:
+            chord = upper - 1
     before = near[at(CHORD + k, lane, n)]
     near[at(CHORD + k, lane, n)] = chord
     return chord != before
 
 
-@written
-def _read_chord(group, lane, k, p, part, work):
-    """Read the chord table in the way of the table, ``p`` the index of the cell."""
-    low = load_four(group.chord_table, p)
-    high = load_four(group.chord_table, p + COLUMNS)
-    raw = raw_index(RAW_CHORD, k, lane, width(work))
-    store(work, raw, _bent(group, lane, low, high, part))
+@inlined
+def _bite(group, lane, k, p, part, position, ahead, work):
+    """Penetration of a pair by the gap of a chord, half of ``ahead`` before a position, m."""
+    n = width(work)
+    offset = work[at(ERROR + k, lane, n)] + _offset(group, lane, k, position, work)
+    gap = _before(group, lane, p + GAP, part, ahead) + offset
+    gap = gap - 0.5 * ahead * work[at(TILT + k, lane, n)]
+    return work[at(layout.LOCAL, lane, n)] - gap
+
+
+@inlined
+def _own_compliance(group, lane, p, part, ahead, work):
+    """Compliance of a pair by a chord without what pairs share, half of ``ahead`` before, m/N."""
+    shared = group.numbers[at(layout.SHARED, lane, width(work))]
+    return _before(group, lane, p + COMPLIANCE, part, ahead) - shared
+
+
+@inlined
+def _before(group, lane, p, part, ahead):
+    """Value of a column with a slope, between two nodes and half of ``ahead`` before."""
+    low, slope = group.table[p], group.table[p + 1]
+    step, step_slope = (
+        group.table[p + COLUMNS] - low,
+        group.table[p + COLUMNS + 1] - slope,
+    )
+    bend = part * (1.0 - part) * group.bend[lane * COLUMNS + GAP]
+    value = low + part * step - bend * step_slope
+    return value - 0.5 * ahead * (slope + part * step_slope)
 
 
 @written

@@ -80,7 +80,7 @@ def pack(
     )
     exact = np.array([exact_numbers(machine) for machine in lanes])
     indices = mesh_indices(lanes, teeth)
-    depth = _depths(lanes)
+    depth = chord_depths(lanes)
     bend = np.outer(0.5 / exact[:, layout.NODES_PER_METER], [1.0, 0.0, 1.0, 0.0])
 
     def joined(values: Callable[[ToothRows], Array]) -> NDArray[np.floating]:
@@ -306,7 +306,7 @@ def _profile(
     return profile.ravel(), first, CELLS_PER_SECOND
 
 
-def _depths(lanes: Sequence[PairDynamics]) -> Array:
+def chord_depths(lanes: Sequence[PairDynamics]) -> Array:
     """Penetrations from which chords hold, (lane, chord) m, infinite for absent chords."""
     depths = [getattr(machine.table, "depth", np.zeros(1)) for machine in lanes]
     filled = np.full((len(lanes), max(len(depth) for depth in depths)), np.inf)

@@ -66,7 +66,7 @@ def check_steps(machine: PairDynamics, solver: Solver, sampling_rate: float) -> 
 
 
 def is_too_coarse(run: Run[MachineT], record: CleanRecord | SimulationError) -> bool:
-    """True if a record should be made again at half the step; never without ``max_error``."""
+    """True if a record should be made again by ``finer``; never without ``max_error``."""
     solver = run.system.solver
     if solver.max_error is None:
         return False
@@ -78,14 +78,17 @@ def is_too_coarse(run: Run[MachineT], record: CleanRecord | SimulationError) -> 
             finest = FINEST_BOUNCING
     elif not isinstance(record, StepError):
         return False
-    return 2 * solver.oversampling <= finest
+    return solver.precision == "float32" or 2 * solver.oversampling <= finest
 
 
 def finer(run: Run[MachineT]) -> Run[MachineT]:
-    """The same run at half the step."""
+    """The same run at half the step, or first in float64: shorter steps are rounded more often."""
     solver = run.system.solver
-    halved = replace(solver, oversampling=2 * solver.oversampling)
-    return replace(run, system=replace(run.system, solver=halved))
+    if solver.precision == "float32":
+        better = replace(solver, precision="float64")
+    else:
+        better = replace(solver, oversampling=2 * solver.oversampling)
+    return replace(run, system=replace(run.system, solver=better))
 
 
 def not_finite(run: Run[MachineT], meshes: Sequence[PairDynamics]) -> StepError:

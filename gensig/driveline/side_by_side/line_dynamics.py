@@ -1,4 +1,4 @@
-"""The motion of one line of spur meshes."""
+"""The motion of one line of toothed meshes."""
 
 from __future__ import annotations
 
@@ -14,17 +14,12 @@ from gensig.driveline.running import RunningLine
 from gensig.driveline.side_by_side.line_pairs import mesh_pair
 from gensig.driveline.time.mesh_friction import slide_direction
 from gensig.driveline.time.newmark import static_start
-from gensig.dynamics.backends.nystroem._layout import FOLLOWED
-from gensig.dynamics.backends.nystroem.method import (
-    MOST_CONTACT_RATIO,
-    is_followed_by_three,
-)
+from gensig.dynamics.backends.nystroem.method import is_followed_by_three
 from gensig.dynamics.backends.nystroem.stability import stable_rate
 from gensig.dynamics.backends.step_limits import LONGEST_SETTLING, SETTLED
 from gensig.dynamics.integrator import Solver
 from gensig.dynamics.pair import PairDynamics
 from gensig.errors import SimulationError, StepError
-from gensig.mesh.pair_table import PairTable
 from gensig.operation.setpoint import Operating
 
 Array = NDArray[np.float64]
@@ -36,7 +31,7 @@ STIFFER = 1.2  # than their mean stiffness are meshes taken for the longest step
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LineDynamics:
-    """All parameters of the motion of one line of spur meshes.
+    """All parameters of the motion of one line of toothed meshes.
 
     No slots: what follows from them is cached.
 
@@ -55,6 +50,11 @@ class LineDynamics:
     touched: Index
     senses: Array
     angles: tuple[int, ...]
+
+    @property
+    def has_chords(self) -> bool:
+        """True if a mesh is helical or has more than three pairs of teeth in contact."""
+        return not all(is_followed_by_three(pair) for pair in self.pairs)
 
     @property
     def dofs(self) -> tuple[str, ...]:
@@ -145,7 +145,7 @@ def line_dynamics(
     *,
     angles: Sequence[int],
 ) -> LineDynamics:
-    """The motion of a line whose meshes all have tables of spur teeth.
+    """The motion of a line whose meshes all have tables of teeth.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def line_dynamics(
     meshes = range(len(running.line.meshes))
     return LineDynamics(
         running=running,
-        pairs=tuple(_spur_pair(running, m, operating) for m in meshes),
+        pairs=tuple(_toothed_pair(running, m, operating) for m in meshes),
         touched=np.array([running.touched(m) for m in meshes], dtype=np.int64),
         senses=np.array([running.sense(m) for m in meshes]),
         angles=tuple(running.dof(node) for node in angles),
@@ -188,20 +188,12 @@ def _refuse(pair: PairDynamics) -> None:
             f"mesh.law = {law} is not covered by solver.backend = nystroem on a drive line; "
             f"{OTHER_BACKEND}"
         )
-    if not is_followed_by_three(pair):
-        contact_ratio = pair.table.pair.path_of_contact / pair.table.pair.base_pitch
-        raise SimulationError(
-            f"solver.backend = nystroem follows {FOLLOWED} pairs of teeth on a drive line, too few "
-            f"for a contact ratio of {contact_ratio:.3g} (at most {MOST_CONTACT_RATIO}); "
-            f"{OTHER_BACKEND}"
-        )
 
 
-def _spur_pair(running: RunningLine, m: int, operating: Operating) -> PairDynamics:
-    tabulated = running.tabulated.get(m)
-    if tabulated is None or not isinstance(tabulated.table, PairTable):
+def _toothed_pair(running: RunningLine, m: int, operating: Operating) -> PairDynamics:
+    if m not in running.tabulated:
         raise SimulationError(
-            "solver.backend = nystroem takes meshes of spur teeth, but mesh "
-            f"{running.line.meshes[m].name} has helical ones; {OTHER_BACKEND}"
+            "solver.backend = nystroem takes meshes of tabulated teeth, but mesh "
+            f"{running.line.meshes[m].name} has none; {OTHER_BACKEND}"
         )
     return mesh_pair(running, m, operating)

@@ -16,7 +16,7 @@ from gensig.driveline.side_by_side.line_lanes import pack_lines
 from gensig.dynamics.backends.base import Integration, Motions
 from gensig.dynamics.backends.group_motions import integrate_machines
 from gensig.dynamics.backends.group_run import Core
-from gensig.dynamics.backends.nystroem import _line_kernels
+from gensig.dynamics.backends.nystroem import _line_chord_kernels, _line_kernels
 from gensig.dynamics.backends.nystroem._line_layout import line_scratch
 from gensig.dynamics.backends.nystroem.stability import stable_rate
 from gensig.dynamics.backends.step_limits import COARSE_STABILITY
@@ -24,16 +24,18 @@ from gensig.dynamics.backends.step_limits import COARSE_STABILITY
 Array = NDArray[np.float64]
 
 
-def line_core(n_meshes: int, n_angles: int) -> Core[LineDynamics]:
-    """The core for lines of so many meshes and angles."""
+def line_core(line: LineDynamics) -> Core[LineDynamics]:
+    """The core for lines of the bodies and meshes of one."""
+    kernels = _line_chord_kernels if line.has_chords else _line_kernels
+    n_meshes = len(line.pairs)
     return Core(
         pack=pack_lines,
         scratch=partial(_scratch, n_meshes),
-        integrate=_line_kernels.integrate,
+        integrate=kernels.integrate,
         coarsest_oversampling=_coarsest_oversampling,
         settling_time=lambda line: line.settling_time,
         n_meshes=n_meshes,
-        n_angles=n_angles,
+        n_angles=len(line.angles),
     )
 
 
@@ -42,7 +44,7 @@ def integrate_lines(
 ) -> Motions:
     """Motions of lines of the same bodies and meshes; rows as ``Motions`` says."""
     first = machines[0]
-    core = line_core(len(first.pairs), len(first.angles))
+    core = line_core(first)
     motions = integrate_machines(machines, integration, core)
     angles = [
         angle + line.rest[list(line.angles), None]

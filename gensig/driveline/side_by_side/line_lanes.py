@@ -1,4 +1,4 @@
-"""Lines of spur meshes side by side: from their motions to the flat arrays of the core."""
+"""Lines of toothed meshes side by side: from their motions to the flat arrays of the core."""
 
 from __future__ import annotations
 
@@ -12,19 +12,22 @@ from numpy.typing import NDArray
 
 from gensig.driveline.side_by_side.line_dynamics import LineDynamics
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._layout import COLUMNS
+from gensig.dynamics._layout import COLUMNS, GAP, GAP_SLOPE
 from gensig.dynamics._vector import aligned
 from gensig.dynamics.backends.nystroem import _line_layout as lines
-from gensig.dynamics.backends.nystroem._line_layout import LineGroup
+from gensig.dynamics.backends.nystroem._line_layout import ChordLineGroup, LineGroup
 from gensig.dynamics.backends.nystroem.method import missing_cells
 from gensig.dynamics.lanes import (
     CELLS_PER_SECOND,
+    ToothRows,
+    chord_depths,
     exact_numbers,
     fill_lanes,
     mesh_indices,
     mesh_numbers,
     tooth_rows,
 )
+from gensig.dynamics.pair import PairDynamics
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -58,7 +61,7 @@ def pack_lines(
     for name, values in fields.items():
         if isinstance(values, np.ndarray):
             fields[name] = aligned(np.ascontiguousarray(values))
-    return LineGroup(**fields)
+    return (ChordLineGroup if first.has_chords else LineGroup)(**fields)
 
 
 def _side_by_side(values: Array, precision: str) -> NDArray[np.floating]:
@@ -84,12 +87,20 @@ def _meshes(
         return np.concatenate([getattr(mesh, name).ravel() for mesh in meshes])
 
     numbers = [_side_by_side(mesh.numbers, precision) for mesh in meshes]
+    n_chords = max(mesh.depth.shape[1] for mesh in meshes)
+    depth = np.full((len(meshes), len(lanes), n_chords), np.inf)
+    for row, mesh in zip(depth, meshes, strict=True):
+        row[:, : mesh.depth.shape[1]] = mesh.depth
     return {
         "n_meshes": len(meshes),
         "numbers": np.concatenate(numbers),
         "exact": np.concatenate([mesh.exact.T.ravel() for mesh in meshes]),
         "indices": np.concatenate(indices),
+        "n_pairs": max(int(mesh.indices[:, layout.FOLLOWED].max()) for mesh in meshes),
+        "n_chords": n_chords,
         "table": table.astype(precision),
+        "depth": depth.astype(precision).ravel(),
+        "chord_table": joined("chord_table").astype(precision),
         "bend": joined("bend").astype(precision),
         "tooth_row": joined("tooth_row"),
         "tooth_error": joined("tooth_error"),
@@ -169,13 +180,15 @@ def _coupled(*matrices: Array) -> tuple[Index, Index]:
 class MeshLanes:
     """One mesh of all lanes: ``numbers``, ``exact``, ``indices`` (lane, row), and its teeth.
 
-    ``bend`` (lane, 4); what belongs to teeth lies lane after lane.
+    ``bend`` (lane, 4), ``depth`` (lane, chord); what belongs to teeth lies lane after lane.
     """
 
     numbers: Array
     exact: Array
     indices: Index
     table: Array
+    depth: Array
+    chord_table: Array
     bend: Array
     tooth_row: Index
     tooth_error: Array
@@ -188,7 +201,7 @@ class MeshLanes:
         """Mesh ``m`` of all lanes, whose states are counted from ``rests`` (lane, dof)."""
         pairs = [lane.pairs[m] for lane in lanes]
         teeth = [tooth_rows(pair.table) for pair in pairs]
-        numbers = np.array([mesh_numbers(pair, step, np.zeros(6)) for pair in pairs])
+        numbers = np.array([mesh_numbers(pair, step, _no_rest(pair)) for pair in pairs])
         for row, lane, rest in zip(numbers, lanes, rests, strict=True):
             mesh = lane.running.line.meshes[m]
             row[layout.DAMPING] = mesh.damping
@@ -216,6 +229,10 @@ class MeshLanes:
             table=np.concatenate(
                 [rows.values[..., :COLUMNS].ravel() for rows in teeth]
             ),
+            depth=chord_depths(pairs),
+            chord_table=np.concatenate(
+                [_chord_columns(rows).ravel() for rows in teeth]
+            ),
             bend=bend,
             tooth_row=np.concatenate([rows.row for rows in teeth]),
             tooth_error=of_teeth("error"),
@@ -228,6 +245,19 @@ class MeshLanes:
         indices[:, [layout.TABLE, layout.COAST_TABLE]] += n_values
         indices[:, [layout.PINION_TOOTH, layout.WHEEL_TOOTH]] += n_teeth
         return indices
+
+
+def _chord_columns(teeth: ToothRows) -> Array:
+    """Columns of ``Group.chord_table``; those of spur teeth leave nothing out."""
+    columns = teeth.values[..., COLUMNS:]
+    if columns.shape[-1] > 0:
+        return columns
+    touch = teeth.values[..., GAP : GAP_SLOPE + 1]
+    return np.concatenate([np.zeros_like(touch), touch], axis=-1)
+
+
+def _no_rest(pair: PairDynamics) -> Array:
+    return np.zeros_like(pair.approach_direction())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

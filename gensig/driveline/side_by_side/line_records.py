@@ -110,6 +110,7 @@ def _kind(run: LineRun, line: LineDynamics) -> tuple[object, ...]:
         machine.mesh.roll_torque,
         line.dofs,
         line.touched.tobytes(),
+        line.has_chords,
         line.angles,
     )
 

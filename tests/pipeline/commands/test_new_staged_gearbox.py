@@ -187,10 +187,11 @@ def test_steps_are_as_short_at_any_rate(rate, steps, gensig, tmp_path):
     assert step <= 1.0 / 256000.0
 
 
-def test_helical_stages_have_the_implicit_method(gensig, tmp_path):
-    gensig(f"{NEW} --helix 15")
+@pytest.mark.parametrize(("words", "steps"), [("", 8), ("--rate 25600", 16)])
+def test_helical_stages_have_shorter_steps(gensig, tmp_path, words, steps):
+    gensig(f"{NEW} --helix 15 {words}")
     experiment = yaml.safe_load((tmp_path / "experiment" / "mine.yaml").read_text())
-    assert "solver" not in experiment
+    assert experiment["solver"] == {"backend": "nystroem", "oversampling": steps}
     assert experiment["plan"]["fault_gear"] == "drawn"
 
 

@@ -19,7 +19,7 @@ from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
 from gensig.systems.base import Machine, simulate_together
-from gensig.systems.integration_checks import is_too_coarse
+from gensig.systems.integration_checks import finer, is_too_coarse
 from gensig.systems.pair_machine import (
     GearPairMachine,
     PairMachine,
@@ -235,6 +235,16 @@ def test_bouncing_records_are_refined_less(contact_loss, steps, coarse):
     )
     assert is_too_coarse(run, record) == coarse
     assert not is_too_coarse(run, replace(record, integration_check="error"))
+
+
+def test_what_float32_is_too_coarse_for_is_made_in_float64():
+    machine = read("spur_pair")
+    solver = replace(machine.solver, oversampling=60, precision="float32")
+    run = Run(system=replace(machine, solver=solver), faults=())
+    assert is_too_coarse(run, replace(read_record(), integration_check="unresolved"))
+    assert finer(run).system.solver == replace(solver, precision="float64")
+    halved = finer(finer(run)).system.solver
+    assert halved == replace(solver, precision="float64", oversampling=120)
 
 
 @cache

@@ -37,7 +37,9 @@ from gensig.dynamics.backends.nystroem._any_law_kinks import (
     keep_margins,
     kinked,
     margin_row,
+    push_missed,
 )
+from gensig.dynamics.backends.nystroem._chord_kinks import miss_chords, read_again
 from gensig.dynamics.backends.nystroem._kernels import RECENTER, choose
 from gensig.dynamics.backends.nystroem._layout import (
     BEGIN_AT,
@@ -130,10 +132,10 @@ def integrate(
         turning = speed + get_row(work, v + P_TURN) + (0.5 * step) * turning
         set_row(work, AHEAD + end, step * radius * turning)
         roll_ahead(end, work, wide)
-        if gather(group, end, True, work, wide, near):
-            set_row(work, layout.FLAGS, one)
-            gather(group, begin, False, work, wide, near)
-            count_anew(group, work, near)
+        set_row(work, layout.FLAGS, one)
+        rechosen = gather(group, end, True, work, wide, near)
+        if rechosen:
+            read_again(group, begin, approach, work, wide, near)
         first, last = near_pairs(begin, n, near)
         first_end, last_end = near_pairs(end, n, near)
         first, last = min(first, first_end), max(last, last_end)
@@ -194,6 +196,9 @@ def integrate(
             changed = changed + kinked(group, k, work)
         if any_above(changed, zero):
             correct(group, step, halfway, first, last, mean, v, q, work)
+        if is_helical(group) and rechosen:
+            miss_chords(group, end, approach, first, last, work)
+            push_missed(group, step, first, last, mean, v, q, work)
         set_row(work, rows.NORMAL, law.normal)
         if is_helical(group):
             set_row(work, layout.LAST_TOTAL, get_row(work, layout.TOTAL))
@@ -227,14 +232,16 @@ def look_ahead(group, step, approach, rate, work):
 
 @compiled
 def read_begin(group, begin, fresh, step, approach, rate, work, wide, near):
-    """Read the tables at the begin of the first step of a call."""
+    """Read the tables at the begin of the first step of a call; lanes that go on keep chords."""
     n = width(work)
     for lane in range(n):
+        work[at(layout.FLAGS, lane, n)] = fresh[lane]
         if fresh[lane] > 0.0:
             wide[at(ROLL + begin, lane, n)] = wide[at(BASE, lane, n)]
             mean_force = group.numbers[at(layout.MEAN_FORCE, lane, n)]
             work[at(layout.LAST_TOTAL, lane, n)] = mean_force
     look_ahead(group, step, approach, rate, work)
+    set_row(work, AHEAD + begin, spread(work, 0.0))
     gather(group, begin, True, work, wide, near)
 
 

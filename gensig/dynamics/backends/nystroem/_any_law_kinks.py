@@ -181,20 +181,33 @@ def _add(k, part, short, early, changed, work):
 
 @inlined
 def _give(group, j, changed, first, last, work):
-    """Correct the force of a pair under the one-sided law; the other loaded pairs give way."""
-    zero, one = spread(work, 0.0), spread(work, 1.0)
-    shared, others = get_row(group.numbers, layout.SHARED), zero
-    for i in range(first, last):
-        if i != j:
-            loaded = _margin(MIDDLE_AT, i, work)
-            spring = _spring(MIDDLE, i, work)
-            others = others + where_above(loaded, zero, spring, zero)
+    """Correct the force of a pair under the one-sided law."""
     short, early = _missed(group, j, work)
+    give(group, j, short, early, changed, first, last, work)
+
+
+@inlined
+def give(group, j, short, early, changed, first, last, work):
+    """Add what is missed of the force of a pair, to which the other loaded pairs give way."""
+    one, shared = spread(work, 1.0), get_row(group.numbers, layout.SHARED)
+    others = others_carrying(j, first, last, work)
     _add(j, one, short, early, changed, work)
     given = shared / ((1.0 + shared * others) * get_row(work, ANY_DAMPED + j))
     for i in range(first, last):
         if i != j:
             _give_way(i, given, short, early, changed, work)
+
+
+@inlined
+def others_carrying(j, first, last, work):
+    """Stiffness of the pairs but one that carry in the middle of the step."""
+    zero, others = spread(work, 0.0), spread(work, 0.0)
+    for i in range(first, last):
+        if i != j:
+            loaded = _margin(MIDDLE_AT, i, work)
+            spring = _spring(MIDDLE, i, work)
+            others = others + where_above(loaded, zero, spring, zero)
+    return others
 
 
 @written
@@ -232,11 +245,16 @@ def correct(group, h, approach, first, last, mean, v, q, work):
 
     ``approach`` is that in the middle of the step.
     """
+    miss(group, approach, first, last, work)
+    push_missed(group, h, first, last, mean, v, q, work)
+
+
+@inlined
+def miss(group, approach, first, last, work):
+    """Set what Simpson's rule misses of the force of every pair, and mark lanes with any."""
     zero = spread(work, 0.0)
     any_changed = zero
-    for k in range(first, last):
-        set_row(work, ANY_SHORT + k, zero)
-        set_row(work, ANY_EARLY + k, zero)
+    miss_nothing(first, last, work)
     for k in range(first, last):
         changed = kinked(group, k, work)
         if any_above(changed, zero):
@@ -245,15 +263,31 @@ def correct(group, h, approach, first, last, mean, v, q, work):
                 _give(group, k, changed, first, last, work)
             else:
                 _switch(group, k, changed, approach, first, last, work)
-    _push(group, ANY_SHORT, first, last, 1.0, any_changed, mean, work)
-    _push(group, ANY_SHORT, first, last, h, any_changed, v, work)
-    _push(group, ANY_EARLY, first, last, h * h, any_changed, q, work)
+    set_row(work, rows.ANY_MISSED, any_changed)
+
+
+@inlined
+def miss_nothing(first, last, work):
+    """Let nothing be missed of the force of any pair."""
+    zero = spread(work, 0.0)
+    for k in range(first, last):
+        set_row(work, ANY_SHORT + k, zero)
+        set_row(work, ANY_EARLY + k, zero)
+
+
+@inlined
+def push_missed(group, h, first, last, mean, v, q, work):
+    """Add to the end of the step what is missed, in the lanes that are marked."""
+    changed = get_row(work, rows.ANY_MISSED)
+    _push(group, ANY_SHORT, first, last, 1.0, changed, mean, work)
+    _push(group, ANY_SHORT, first, last, h, changed, v, work)
+    _push(group, ANY_EARLY, first, last, h * h, changed, q, work)
 
 
 @inlined
 def _push(group, forces, first, last, by, changed, target, work):
     """Add accelerations by pair forces, times a number, to rows of the motions of the gears."""
-    law = _missed_law(group, forces, first, last, work)
+    law = missed_law(group, forces, first, last, work)
     _push_gears(group, law, by, changed, target, work)
 
 
@@ -266,7 +300,7 @@ def _push_gears(group, law, by, changed, target, work):
 
 
 @inlined
-def _missed_law(group, forces, first, last, work):
+def missed_law(group, forces, first, last, work):
     """The law of pair forces in the middle of the step, of which nothing is damped or stored."""
     zero = spread(work, 0.0)
     law = layout.Law(zero, zero, zero, zero, zero, zero, zero, zero)

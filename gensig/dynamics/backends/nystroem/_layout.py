@@ -42,13 +42,17 @@ FRESH = FRICTION_WIDTH + 1  # 1 where rows are being set anew
 SHORT = FRESH + 1
 EARLY = SHORT + FOLLOWED
 DRIVE = EARLY + FOLLOWED
-# of meshes of any law, blocks of a row per pair: margins at begin, middle and end of the step,
-# damping in its middle, and the corrections by kinks
-ANY_MARGIN = DRIVE + layout.N_DRIVE
+# of meshes of any law: 1 where kinks are corrected; and blocks of a row per pair: margins at begin,
+# middle and end of the step, damping in its middle, and the corrections by kinks
+ANY_MISSED = DRIVE + layout.N_DRIVE
+ANY_MARGIN = ANY_MISSED + 1
 ANY_DAMPED = ANY_MARGIN + N_INSTANTS * layout.MOST_PAIRS
 ANY_SHORT = ANY_DAMPED + layout.MOST_PAIRS
 ANY_EARLY = ANY_SHORT + layout.MOST_PAIRS
 N_FIXED = ANY_EARLY + layout.MOST_PAIRS
+# rows of a pair of helical teeth in the slot ``PART``, which this core has no other use for: what
+# another chord adds to its force and to its stiffness at the begin of the step, and the penetration
+MORE_FORCE, MORE_STIFFNESS, BITTEN = layout.COMPLIANCE, layout.STIFFNESS, layout.GAP
 # blocks of rows per degree of freedom behind them, two gears and two rotors at most: constants
 # are faster than the number of a machine
 MOST_DOFS, MOST_HELICAL_DOFS = 8, 14

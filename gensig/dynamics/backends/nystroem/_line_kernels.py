@@ -100,21 +100,14 @@ def integrate(
     n_dof, n_meshes = len(group.force) // n, group.n_meshes
     n_channels = len(channels) if out_row >= 0 else 0
     machine = machine_rows(work, n_meshes, n)
-    changing = len(group.profile) > (lines.N_PROFILE + 2 * n_dof) * n
     begin(group, step, state, work)
-    by_tooth, starting = False, False
+    starting, by_tooth = is_any_fresh(fresh, n), False
     for lane in range(n):
-        starting = starting or fresh[lane] > 0.0
         for m in range(n_meshes):
             wheel_rows = at(m * layout.N_INDICES + layout.WHEEL_ROWS, lane, n)
             by_tooth = by_tooth or group.indices[wheel_rows] > 0
     for number in range(first_step, first_step + n_steps):
-        is_recentred = number % RECENTER == 0
-        if is_recentred:
-            recenter(group, machine, wide)
-        set_rolls(group, number * step, machine, wide)
-        if changing or is_recentred or number == first_step:
-            set_forces(group, number * step, machine, wide)
+        begin_step(group, number, number == first_step, step, machine, wide)
         if starting and number == first_step:
             start(group, fresh, by_tooth, work, wide)
         if angle_row >= 0 and number % per_angle == 0:
@@ -151,16 +144,9 @@ def integrate(
             conclude(d * lines.N_BLOCKS, a, step, 1, machine)
         for m in range(n_meshes):
             end_mesh(group, m, step, machine, work)
-        gain = get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
         out_first = (out_row + number - first_step) * n_channels
-        for c in range(n_channels):
-            d = number_at(channels, c)
-            carried = gain * get_row(group.rotation, d)
-            value = get_row(machine, of(rows.MEAN, d)) + carried
-            set_row(out, out_first + c, value)
-    for d in range(n_dof):
-        set_row(state, d, get_row(machine, of(rows.Q, d)))
-        set_row(state, n_dof + d, get_row(machine, of(rows.V, d)))
+        write_means(group, channels, n_channels, out, out_first, machine)
+    end(group, state, machine)
     return angle_row
 
 
@@ -184,6 +170,48 @@ def begin(group, step, state, work):
         set_row(own, layout.MOST_DAMPER, most)
         for lane in range(n):
             own[at(rows.BEND, lane, n)] = mesh.bend[lane * layout.COLUMNS]
+
+
+@inlined
+def is_any_fresh(fresh, n):
+    """True if any lane starts anew."""
+    starting = False
+    for lane in range(n):
+        starting = starting or fresh[lane] > 0.0
+    return starting
+
+
+@inlined
+def begin_step(group, number, is_first, step, machine, wide):
+    """Set rolls and forces at the begin of a step, ``is_first`` of its call."""
+    n = width(machine)
+    n_dof = len(group.force) // n
+    is_recentred = number % RECENTER == 0
+    if is_recentred:
+        recenter(group, machine, wide)
+    set_rolls(group, number * step, machine, wide)
+    is_changing = len(group.profile) > (lines.N_PROFILE + 2 * n_dof) * n
+    if is_changing or is_recentred or is_first:
+        set_forces(group, number * step, machine, wide)
+
+
+@inlined
+def write_means(group, channels, n_channels, out, first, machine):
+    """Write the mean accelerations of a step to rows from ``first`` on."""
+    gain = get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
+    for c in range(n_channels):
+        d = number_at(channels, c)
+        carried = gain * get_row(group.rotation, d)
+        set_row(out, first + c, get_row(machine, of(rows.MEAN, d)) + carried)
+
+
+@inlined
+def end(group, state, machine):
+    """Keep the state behind the last step of a call."""
+    n_dof = len(group.force) // width(machine)
+    for d in range(n_dof):
+        set_row(state, d, get_row(machine, of(rows.Q, d)))
+        set_row(state, n_dof + d, get_row(machine, of(rows.V, d)))
 
 
 @inlined
@@ -277,16 +305,11 @@ def _in_row(exact, row, work):
 def start(group, fresh, by_tooth, work, wide):
     """Set what the step remembers in the lanes that are fresh, from one evaluation there."""
     n = width(work)
-    n_dof, n_meshes = len(group.force) // n, group.n_meshes
-    machine = machine_rows(work, n_meshes, n)
+    machine = machine_rows(work, group.n_meshes, n)
     zero = spread(work, 0.0)
     q, v = rows.Q, rows.V
-    for d in range(n_dof):
-        moved, rate = get_row(machine, of(q, d)), get_row(machine, of(v, d))
-        own_pull(group, d, moved, rate, machine)
-    couple(group, rows.Q, rows.V, machine)
-    govern(group, rows.Q, rows.V, machine)
-    for m in range(n_meshes):
+    pull_at_begin(group, machine)
+    for m in range(group.n_meshes):
         mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
         own_wide = wide_rows(wide, m, n)
         first_pairs(mesh, fresh, own, own_wide)
@@ -321,8 +344,24 @@ def start(group, fresh, by_tooth, work, wide):
             force = get_row(own, rows.PAIR_FORCE + j)
             force = where_above(flags, zero, force, kept[j])
             set_row(own, rows.PAIR_FORCE + j, force)
-    flags = get_row(machine, rows.FRESH)
-    for d in range(n_dof):
+    accelerate_fresh(group, get_row(machine, rows.FRESH), machine)
+
+
+@inlined
+def pull_at_begin(group, machine):
+    """Set all forces but those of meshes from the state at the begin of a step."""
+    q, v = rows.Q, rows.V
+    for d in range(len(group.force) // width(machine)):
+        moved, rate = get_row(machine, of(q, d)), get_row(machine, of(v, d))
+        own_pull(group, d, moved, rate, machine)
+    couple(group, q, v, machine)
+    govern(group, q, v, machine)
+
+
+@inlined
+def accelerate_fresh(group, flags, machine):
+    """Set what a step remembers to the accelerations at its begin, where flags are above 0."""
+    for d in range(len(group.force) // width(machine)):
         a = acceleration(group, d, machine)
         choose(flags, of(rows.NOW, d), a, machine)
         choose(flags, of(rows.HALFWAY, d), a, machine)

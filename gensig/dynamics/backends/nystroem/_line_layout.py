@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._layout import COLUMNS
+from gensig.dynamics._layout import COLUMNS, Helical
 from gensig.dynamics._vector import n_lanes
 from gensig.dynamics._written import written
 from gensig.dynamics.backends.nystroem import _layout as rows
@@ -21,10 +21,17 @@ from gensig.dynamics.backends.nystroem._layout import block
 # block behind those of a pair: all forces on the machine
 ON = rows.N_BLOCKS
 N_BLOCKS = ON + 1
-# rows of a mesh, which one pair holds in registers: roll over the step at whose end the nodes were
-# read, and rotation of gear a at its begin
-AHEAD, BEGUN = layout.AHEAD, layout.AHEAD + 1
-PULL = layout.AHEAD + 2  # of the machine: pull of the governor on each of ``held``
+# row of a spur mesh, which one pair holds in registers: roll over the step at whose end the nodes
+# were read
+AHEAD = layout.AHEAD
+BEGUN = (
+    layout.STEP_APPROACH
+)  # row of a mesh: rotation of gear a at the begin of the step
+# of the machine: pull of the governor on each of ``held``; no torque has a row of its own
+PULL = rows.DRIVE + layout.DRIVE_TORQUE
+# integer row of a mesh with chords: 1 in its first place if a pair or a chord changes in the step
+RECHOSEN = rows.N_COUNTS
+N_COUNTS = RECHOSEN + 1
 # degrees of freedom that a mesh acts on: x, y and rotation of its driving gear a and its driven
 # gear b; NONE for a gear that does not move so
 A_X, A_Y, A_TURN, B_X, B_Y, B_TURN, N_TOUCHED = range(7)
@@ -37,9 +44,10 @@ ANGLE, SPEED, GAIN, N_PROFILE = range(4)
 class LineGroup(NamedTuple):
     """Machines of several spur meshes side by side, all of the same bodies and meshes.
 
-    ``numbers``, ``exact`` and ``indices`` (mesh, row, lane), ``bend`` (mesh, lane, 4) and all that
-    belongs to teeth are those of ``gensig.dynamics._layout.Group``, mesh after mesh; the table
-    ends with one cell of a missing pair and one cell of zeros.
+    ``numbers``, ``exact`` and ``indices`` (mesh, row, lane), ``bend`` (mesh, lane, 4), ``depth``
+    (mesh, lane, chord) and all that belongs to teeth are those of
+    ``gensig.dynamics._layout.Group``, mesh after mesh; the table ends with one cell of a missing
+    pair and one cell of zeros.
 
     The machine is M q'' + C q' + K q = f + mesh forces; q is the deviation from nominal rotation.
     The state is q less ``rest`` (dof, lane). ``touched`` (mesh, 6) are the degrees of freedom of a
@@ -61,7 +69,11 @@ class LineGroup(NamedTuple):
     numbers: Any
     exact: Any
     indices: Any
+    n_pairs: int
+    n_chords: int
     table: Any
+    depth: Any
+    chord_table: Any
     bend: Any
     tooth_row: Any
     tooth_error: Any
@@ -93,6 +105,13 @@ class LineGroup(NamedTuple):
     angles: Any
 
 
+class ChordLineGroup(LineGroup):
+    """Machines of meshes of which some are helical, or have more than three pairs in contact.
+
+    Spur teeth have one chord.
+    """
+
+
 class Mesh(NamedTuple):
     """One mesh of a ``LineGroup``, for the functions that know one mesh."""
 
@@ -106,6 +125,29 @@ class Mesh(NamedTuple):
     tooth_tilt: Any
     one_sided: bool
     consistent: bool
+
+
+class ChordMeshFields(NamedTuple):
+    """Fields of a ``ChordMesh``."""
+
+    numbers: Any
+    exact: Any
+    indices: Any
+    n_pairs: Any
+    n_chords: Any
+    table: Any
+    depth: Any
+    chord_table: Any
+    bend: Any
+    tooth_row: Any
+    tooth_error: Any
+    tooth_tilt: Any
+    one_sided: bool
+    consistent: bool
+
+
+class ChordMesh(ChordMeshFields, Helical):
+    """One mesh of a ``ChordLineGroup``, for the functions that know one mesh."""
 
 
 @written
@@ -132,6 +174,27 @@ def mesh_of(group, m, n):
 
 
 @written
+def chord_mesh_of(group, m, n):
+    """Mesh ``m`` of a group whose meshes have chords; views, not copies."""
+    return ChordMesh(
+        tail(group.numbers, m * (layout.N_NUMBERS * n)),
+        tail(group.exact, m * (layout.N_EXACT * n)),
+        tail(group.indices, m * (layout.N_INDICES * n)),
+        group.n_pairs,
+        group.n_chords,
+        group.table,
+        tail(group.depth, m * (group.n_chords * n)),
+        group.chord_table,
+        tail(group.bend, m * (COLUMNS * n)),
+        group.tooth_row,
+        group.tooth_error,
+        group.tooth_tilt,
+        group.one_sided,
+        group.consistent,
+    )
+
+
+@written
 def mesh_rows(work, m, n):
     """Rows of one mesh in the scratch; a view."""
     return tail(work, m * (rows.N_FIXED * n))
@@ -144,6 +207,12 @@ def wide_rows(wide, m, n):
 
 
 @written
+def integer_rows(near, m, n):
+    """Rows of one mesh in the integer scratch; a view."""
+    return tail(near, m * (N_COUNTS * n))
+
+
+@written
 def machine_rows(work, n_meshes, n):
     """Rows of the machine: ``N_FIXED`` of its last mesh, and its blocks; a view."""
     return tail(work, (n_meshes - 1) * (rows.N_FIXED * n))
@@ -153,4 +222,5 @@ def line_scratch(n_meshes, n_dof, precision="float64"):
     """Work rows, float64 rows and integer rows of ``integrate`` for so many meshes."""
     n = n_lanes(precision)
     work = np.zeros((n_meshes * rows.N_FIXED + N_BLOCKS * n_dof) * n, dtype=precision)
-    return work, np.zeros(n_meshes * rows.N_WIDE * n), np.zeros(1, dtype=np.int64)
+    near = np.zeros(n_meshes * N_COUNTS * n, dtype=np.int64)
+    return work, np.zeros(n_meshes * rows.N_WIDE * n), near

@@ -122,9 +122,15 @@ def correct(group, mesh, m, step, changed, machine, own):
     miss(mesh.numbers, changed, own)
     any_changed = changed[0] + changed[1] + changed[2]
     short, early = missed_law(mesh, rows.SHORT, own), missed_law(mesh, rows.EARLY, own)
-    _correct(group, m, short, 1.0, any_changed, rows.MEAN, machine)
-    _correct(group, m, short, step, any_changed, rows.V, machine)
-    _correct(group, m, early, step * step, any_changed, rows.Q, machine)
+    correct_by(group, m, short, early, step, any_changed, machine)
+
+
+@written
+def correct_by(group, m, short, early, step, changed, machine):
+    """Add to the end of the step what a mesh misses of the mean of its law, and early in it."""
+    _correct(group, m, short, 1.0, changed, rows.MEAN, machine)
+    _correct(group, m, short, step, changed, rows.V, machine)
+    _correct(group, m, early, step * step, changed, rows.Q, machine)
 
 
 @written

@@ -1,0 +1,377 @@
+"""Two-evaluation core for machines of several meshes, some helical or of high contact ratio.
+
+The machine is that of ``_line_kernels``; tables, law and kinks of its meshes are those of
+``_any_law_kernels``.
+"""
+
+from __future__ import annotations
+
+from gensig.dynamics import _layout as layout
+from gensig.dynamics._kernels import keep_begin, near_pairs, roll_ahead, write_mesh
+from gensig.dynamics._layout import AHEAD, BASE, EVEN, MIDDLE, ODD, PART, ROLL
+from gensig.dynamics._mesh_kernels import mesh_law
+from gensig.dynamics._record_kernels import integrates
+from gensig.dynamics._tables import between, chords_between, cover, gather
+from gensig.dynamics._vector import (
+    any_above,
+    at,
+    compiled,
+    get_row,
+    inlined,
+    set_row,
+    spread,
+    where_above,
+    width,
+)
+from gensig.dynamics._written import written
+from gensig.dynamics.backends.nystroem import _any_law_kernels as any_law
+from gensig.dynamics.backends.nystroem import _layout as rows
+from gensig.dynamics.backends.nystroem import _line_layout as lines
+from gensig.dynamics.backends.nystroem._any_law_kinks import (
+    begin_again,
+    count_anew,
+    keep_margins,
+    kinked,
+    margin_row,
+    miss,
+    missed_law,
+)
+from gensig.dynamics.backends.nystroem._chord_kinks import miss_chords, read_again
+from gensig.dynamics.backends.nystroem._kernels import choose
+from gensig.dynamics.backends.nystroem._layout import END_AT, MIDDLE_AT
+from gensig.dynamics.backends.nystroem._line_kernels import (
+    accelerate_fresh,
+    begin,
+    begin_step,
+    end,
+    is_any_fresh,
+    pull_at_begin,
+    write_angles,
+    write_means,
+)
+from gensig.dynamics.backends.nystroem._line_layout import (
+    ChordLineGroup,
+    chord_mesh_of,
+    integer_rows,
+    machine_rows,
+    mesh_rows,
+    of,
+    wide_rows,
+)
+from gensig.dynamics.backends.nystroem._line_meshes import (
+    acceleration,
+    correct_by,
+    couple,
+    govern,
+    motion,
+    own_pull,
+    push,
+    ratio,
+    rolled,
+    touched,
+    turning_speed,
+)
+from gensig.dynamics.backends.nystroem._motion import conclude, predict, to_middle
+
+
+@compiled
+def integrate(
+    group,
+    state,
+    lost,
+    fresh,
+    step,
+    first_step,
+    n_steps,
+    channels,
+    out,
+    out_row,
+    angle,
+    angle_row,
+    per_angle,
+    seen,
+    work,
+    wide,
+    near,
+):
+    """Advance every lane by ``n_steps``; parameters are those of ``_line_kernels.integrate``."""
+    n = width(work)
+    n_dof, n_meshes = len(group.force) // n, group.n_meshes
+    n_channels = len(channels) if out_row >= 0 else 0
+    machine = machine_rows(work, n_meshes, n)
+    begin(group, step, state, work)
+    starting = is_any_fresh(fresh, n)
+    slot, next_slot = EVEN, ODD
+    for number in range(first_step, first_step + n_steps):
+        begin_step(group, number, number == first_step, step, machine, wide)
+        if number == first_step:
+            for m in range(n_meshes):
+                read_begin(group, m, slot, fresh, step, machine, work, wide, near)
+            if starting:
+                start(group, slot, fresh, work, wide, near)
+        if angle_row >= 0 and number % per_angle == 0:
+            write_angles(group, angle, angle_row, machine, wide)
+            if len(seen) > 0:
+                for m in range(n_meshes):
+                    own = mesh_rows(work, m, n)
+                    normal = get_row(own, rows.NORMAL)
+                    seen_row = angle_row * n_meshes + m
+                    counts = integer_rows(near, m, n)
+                    write_mesh(seen, seen_row, normal, own, counts)
+            angle_row += 1
+        for m in range(n_meshes):
+            read_mesh(group, m, slot, next_slot, step, lost, machine, work, wide, near)
+        for d in range(n_dof):
+            moved, rate = to_middle(d * lines.N_BLOCKS, step, 1, machine)
+            own_pull(group, d, moved, rate, machine)
+        couple(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
+        govern(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
+        for m in range(n_meshes):
+            push_mesh(
+                group,
+                m,
+                MIDDLE,
+                MIDDLE_AT,
+                0.5 * step,
+                rows.MIDDLE_Q,
+                rows.MIDDLE_V,
+                machine,
+                work,
+                wide,
+                near,
+            )
+        for d in range(n_dof):
+            a = acceleration(group, d, machine)
+            moved, rate = predict(d * lines.N_BLOCKS, a, step, 1, machine)
+            own_pull(group, d, moved, rate, machine)
+        couple(group, rows.END_Q, rows.END_V, machine)
+        govern(group, rows.END_Q, rows.END_V, machine)
+        for m in range(n_meshes):
+            push_mesh(
+                group,
+                m,
+                next_slot,
+                END_AT,
+                step,
+                rows.END_Q,
+                rows.END_V,
+                machine,
+                work,
+                wide,
+                near,
+            )
+        for d in range(n_dof):
+            a = acceleration(group, d, machine)
+            conclude(d * lines.N_BLOCKS, a, step, 1, machine)
+        for m in range(n_meshes):
+            end_mesh(group, m, next_slot, step, machine, work, near)
+        out_first = (out_row + number - first_step) * n_channels
+        write_means(group, channels, n_channels, out, out_first, machine)
+        slot, next_slot = next_slot, slot
+    if slot == ODD:
+        for m in range(n_meshes):
+            own, own_wide = mesh_rows(work, m, n), wide_rows(wide, m, n)
+            keep_begin(own, own_wide, integer_rows(near, m, n))
+    end(group, state, machine)
+    return angle_row
+
+
+integrates(integrate, ChordLineGroup)
+
+
+@compiled
+def read_begin(group, m, slot, fresh, step, machine, work, wide, near):
+    """Read the tables of a mesh at the begin of the first step of a call."""
+    n = width(work)
+    mesh, own = chord_mesh_of(group, m, n), mesh_rows(work, m, n)
+    own_wide, counts = wide_rows(wide, m, n), integer_rows(near, m, n)
+    for lane in range(n):
+        if fresh[lane] > 0.0:
+            counts[at(layout.NEWEST, lane, n)] = layout.NO_PAIR
+    approach, rate = motion(group, m, rows.Q, rows.V, machine)
+    any_law.read_begin(mesh, slot, fresh, step, approach, rate, own, own_wide, counts)
+
+
+@compiled
+def start(group, slot, fresh, work, wide, near):
+    """Set what the step remembers in the lanes that are fresh, from one evaluation there."""
+    n = width(work)
+    machine = machine_rows(work, group.n_meshes, n)
+    pull_at_begin(group, machine)
+    for m in range(group.n_meshes):
+        _start_mesh(group, m, slot, fresh, machine, work, wide, near)
+    for lane in range(n):
+        machine[at(rows.FRESH, lane, n)] = fresh[lane]
+    accelerate_fresh(group, get_row(machine, rows.FRESH), machine)
+
+
+@inlined
+def _start_mesh(group, m, slot, fresh, machine, work, wide, near):
+    """Push by a mesh at the begin of a step, and set what it remembers where it is fresh."""
+    n = width(work)
+    mesh, own = chord_mesh_of(group, m, n), mesh_rows(work, m, n)
+    own_wide, counts = wide_rows(wide, m, n), integer_rows(near, m, n)
+    for lane in range(n):
+        own[at(rows.FRESH, lane, n)] = fresh[lane]
+    _set_ahead(slot, own, own_wide)
+    _set_begun(group, m, machine, own)
+    # what the other lanes remember waits in other rows
+    set_row(own, rows.ANY_EARLY, get_row(own, rows.NORMAL))
+    for k in range(layout.MOST_PAIRS):
+        set_row(own, rows.ANY_SHORT + k, get_row(own, layout.PAIR_FORCE + k))
+    first, last = near_pairs(slot, n, counts)
+    _keep_near(first, last, n, counts)
+    push_mesh(group, m, slot, END_AT, 0.0, rows.Q, rows.V, machine, work, wide, near)
+    count_anew(mesh, own, counts)
+    _keep_others(rows.NORMAL, rows.ANY_EARLY, own)
+    for k in range(layout.MOST_PAIRS):
+        _keep_others(layout.PAIR_FORCE + k, rows.ANY_SHORT + k, own)
+        if first <= k < last:
+            margin = get_row(own, margin_row(END_AT, k))
+            choose(get_row(own, rows.FRESH), margin_row(rows.BEGIN_AT, k), margin, own)
+
+
+@written
+def _keep_others(row, kept, own):
+    """Take a row back from where it was kept in the lanes that are not fresh."""
+    flags, zero = get_row(own, rows.FRESH), spread(own, 0.0)
+    set_row(own, row, where_above(flags, zero, get_row(own, row), get_row(own, kept)))
+
+
+@inlined
+def _set_ahead(slot, own, own_wide):
+    """Set the roll of a slot since the begin of the step, in the precision of the scratch."""
+    n = width(own)
+    for lane in range(n):
+        ahead = own_wide[at(ROLL + slot, lane, n)] - own_wide[at(BASE, lane, n)]
+        own[at(AHEAD + slot, lane, n)] = ahead
+
+
+@inlined
+def read_mesh(group, m, slot, next_slot, step, lost, machine, work, wide, near):
+    """Read the tables of a mesh at the end of the step, and set those in its middle."""
+    n = width(work)
+    mesh, own = chord_mesh_of(group, m, n), mesh_rows(work, m, n)
+    own_wide, counts = wide_rows(wide, m, n), integer_rows(near, m, n)
+    zero, one = spread(work, 0.0), spread(work, 1.0)
+    normal = get_row(own, rows.NORMAL)
+    apart = where_above(normal * normal, zero, zero, one)
+    set_row(lost, m, get_row(lost, m) + apart)
+    approach, rate = motion(group, m, rows.Q, rows.V, machine)
+    any_law.look_ahead(mesh, step, approach, rate, own)
+    ahead = step * get_row(mesh.numbers, layout.PINION_RADIUS)
+    ahead = ahead * _mean_speed(group, m, step, machine)
+    set_row(own, AHEAD + next_slot, ahead)
+    _read(mesh, slot, next_slot, approach, own, own_wide, counts)
+    _set_begun(group, m, machine, own)
+
+
+@written
+def _set_begun(group, m, machine, own):
+    """Keep the rotation of gear a at the begin of the step."""
+    turned = of(rows.Q, touched(group, m, lines.A_TURN))
+    set_row(own, lines.BEGUN, get_row(machine, turned))
+
+
+@inlined
+def _keep_near(first, last, n, counts):
+    """Keep which pairs come near in the step; no step of this core has parts."""
+    span = layout.span_index(PART, n)
+    counts[span + layout.FIRST_NEAR_PAIR] = first
+    counts[span + layout.LAST_NEAR_PAIR] = last
+
+
+@written
+def _mean_speed(group, m, step, machine):
+    """Speed of gear a in the middle of the step, with every force at its begin, rad/s."""
+    zero = spread(machine, 0.0)
+    turned = of(rows.NOW, touched(group, m, lines.A_TURN))
+    gain = ratio(group, m, machine) * get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
+    gain = gain + get_row(machine, turned)
+    return turning_speed(group, m, rows.V, zero, machine) + (0.5 * step) * gain
+
+
+@compiled
+def _read(mesh, slot, next_slot, approach, own, own_wide, counts):
+    """Read a mesh where ``AHEAD`` of the next slot says, and keep which pairs come near."""
+    n = width(own)
+    roll_ahead(next_slot, own, own_wide)
+    set_row(own, layout.FLAGS, spread(own, 1.0))
+    rechosen = gather(mesh, next_slot, True, own, own_wide, counts)
+    counts[lines.RECHOSEN * n] = rechosen
+    if rechosen:
+        read_again(mesh, slot, approach, own, own_wide, counts)
+    first, last = near_pairs(slot, n, counts)
+    first_end, last_end = near_pairs(next_slot, n, counts)
+    first, last = min(first, first_end), max(last, last_end)
+    cover(slot, first, last, own, counts)
+    cover(next_slot, first, last, own, counts)
+    _set_ahead(slot, own, own_wide)
+    between(slot, next_slot, MIDDLE, first, last, own)
+    chords_between(slot, next_slot, MIDDLE, first, last, own)
+    _keep_near(first, last, n, counts)
+
+
+@compiled
+def push_mesh(group, m, slot, instant, since, q, v, machine, work, wide, near):
+    """Evaluate the law of a mesh ``since`` s after the begin of the step and add its forces.
+
+    The state is in the blocks ``q`` and ``v``. Forces and margins at the instant are kept.
+    """
+    n = width(work)
+    mesh, own = chord_mesh_of(group, m, n), mesh_rows(work, m, n)
+    first, last = near_pairs(PART, n, integer_rows(near, m, n))
+    for k in range(layout.MOST_PAIRS):
+        set_row(own, layout.PAIR_FORCE + k, spread(work, 0.0))
+    approach, rate = motion(group, m, q, v, machine)
+    speed = turning_speed(group, m, v, spread(work, since), machine)
+    law = mesh_law(
+        mesh,
+        first,
+        last,
+        slot,
+        layout.MARGIN,
+        rolled(group, m, since, q, machine, own),
+        approach,
+        rate,
+        get_row(mesh.numbers, layout.PINION_RADIUS) * speed,
+        own,
+        wide_rows(wide, m, n),
+    )
+    if instant == MIDDLE_AT:
+        keep_margins(mesh, MIDDLE_AT, first, last, slot, own)
+    else:
+        keep_margins(mesh, END_AT, first, last, slot, own)
+    push(group, m, law, machine)
+    set_row(own, rows.NORMAL, law.normal)
+
+
+@inlined
+def end_mesh(group, m, slot, step, machine, work, near):
+    """Correct the end of the step for the kinks of a mesh, and shift what it remembers."""
+    n = width(work)
+    mesh, own = chord_mesh_of(group, m, n), mesh_rows(work, m, n)
+    counts, zero = integer_rows(near, m, n), spread(work, 0.0)
+    first, last = near_pairs(PART, n, counts)
+    changed = zero
+    for k in range(first, last):
+        changed = changed + kinked(mesh, k, own)
+    if any_above(changed, zero):
+        # the approach counts under the paper's law alone, which drive lines do not have
+        miss(mesh, zero, first, last, own)
+        _correct(group, mesh, m, step, first, last, machine, own)
+    if counts[lines.RECHOSEN * n]:
+        approach, _ = motion(group, m, rows.END_Q, rows.END_V, machine)
+        miss_chords(mesh, slot, approach, first, last, own)
+        _correct(group, mesh, m, step, first, last, machine, own)
+    set_row(own, layout.LAST_TOTAL, get_row(own, layout.TOTAL))
+    begin_again(mesh, first, last, own)
+
+
+@compiled
+def _correct(group, mesh, m, step, first, last, machine, own):
+    """Add to the end of the step what a mesh misses, in the lanes that are marked."""
+    changed = get_row(own, rows.ANY_MISSED)
+    short = missed_law(mesh, rows.ANY_SHORT, first, last, own)
+    early = missed_law(mesh, rows.ANY_EARLY, first, last, own)
+    correct_by(group, m, short, early, step, changed, machine)

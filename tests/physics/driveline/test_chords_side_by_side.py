@@ -1,0 +1,189 @@
+"""Lines of helical meshes, and of many pairs in contact, in the two-evaluation core."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fault_cases import one
+from side_by_side_lines import (
+    RATE,
+    assert_moves_as_a_line,
+    recorded,
+    run_of,
+    specimen_of,
+    spectrum,
+    with_solver,
+)
+
+import gensig
+from gensig.driveline.reading import read_line_machine
+from gensig.driveline.side_by_side.line_dynamics import LineDynamics
+from gensig.dynamics.decimation import in_band_error
+from gensig.faults.broken import MissingTooth
+from gensig.plan.request import read_request
+from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.registry import read_system
+from gensig.systems.run import Run, Start
+
+SHORT = (
+    "sensing.sampling_rate_hz=51200",
+    "operating.duration_s=0.1",
+    "operating.drive_frequency_hz=20",
+)
+HELICAL = (
+    "experiment=two_stage",
+    "system=phm09_helical_two_stage",
+    "solver.oversampling=8",
+    *SHORT,
+)
+LOSSLESS = ("system.loss_factor.shaft=0", "system.loss_factor.coupling=0")
+SPUR = ("experiment=two_stage", "solver.oversampling=5", *SHORT)
+MISSING = (MissingTooth(gear="pinion", tooth=3),)
+CROWNED = (
+    "system=helical_pair",
+    "gear=xiamen_23_84",
+    "mesh.n_slices=8",
+    "modification.pinion.crowning_um=15",
+    "operating.drive_frequency_hz=20",
+    "gear.pinion.support.damping_x_ns_per_m=100",
+    "gear.wheel.support.damping_x_ns_per_m=500",
+)
+
+
+def line(*words):
+    """A line machine by overrides."""
+    return read_line_machine(read_request([*words]).config)
+
+
+@pytest.fixture(scope="module")
+def helical():
+    """A gearbox of two helical stages with lateral motion."""
+    return line(*HELICAL)
+
+
+@pytest.mark.parametrize("faults", [(), MISSING], ids=["sound", "missing"])
+def test_a_pair_with_chords_as_a_line_moves_as_the_pair(faults):
+    """Crowned spur slices, which act on no motion out of their plane."""
+    system = read_system(read_request([*CROWNED]).config)
+    start = Start(tooth_pinion=3, tooth_wheel=5, phase=0.3)
+    run = Run(system=system, faults=faults, start=start, specimen=specimen_of(system))
+    pair = pair_dynamics(run)
+    assert len(pair.table.depth) > 4
+    assert_moves_as_a_line(pair, oversampling=12)  # tilts are stiff
+
+
+def test_two_helical_stages_are_accurate_to_a_thousandth(helical):
+    exact = with_solver(helical, oversampling=40, max_error=None)
+    crack = (one("crack", tooth=4),)
+    runs = [run_of(machine, crack) for machine in (helical, exact)]
+    found, expected = (record.acceleration[None] for record in recorded(*runs))
+    assert 0.0 < in_band_error(found, expected, RATE)[0] < 1e-3
+
+
+@pytest.mark.parametrize("grade", [None, 6], ids=["perfect", "grade 6"])
+def test_two_helical_stages_agree_with_the_implicit_method(grade):
+    """Both methods have one law of the teeth.
+
+    Between the nodes of the tables they differ by up to 1 % of a quiet record, and by a fourth of
+    that with four times the nodes.
+    """
+    words = [*HELICAL, *LOSSLESS, "sensing.channels=[pinion_x, pinion_y, wheel_y]"]
+    if grade is not None:
+        words.append(f"quality.iso1328_grade={grade}")
+    machine = line(*words)
+    specimen = None if grade is None else specimen_of(machine)
+    slow = with_solver(machine, backend="newmark", oversampling=40)
+    smooth = replace(slow, mesh=replace(slow.mesh, friction_coefficient=0.0))
+    runs = [run_of(each, specimen=specimen) for each in (machine, slow, smooth)]
+    records = recorded(*runs)
+    for row in range(len(machine.sensing.channels)):
+        found, expected, other = (
+            spectrum(record.acceleration[row]) for record in records
+        )
+        size = np.linalg.norm(expected)
+        assert np.linalg.norm(found - expected) < 0.01 * size
+        assert np.linalg.norm(other - expected) > 0.02 * size
+
+
+def test_the_loads_of_both_meshes_are_those_of_the_implicit_method():
+    machine = line(*HELICAL, *LOSSLESS)
+    slow = with_solver(machine, backend="newmark", oversampling=40)
+    runs = [run_of(each, with_mesh_state=True) for each in (machine, slow)]
+    ours, theirs = recorded(*runs)
+    meshes = zip(
+        (ours.mesh, *ours.further_meshes),
+        (theirs.mesh, *theirs.further_meshes),
+        strict=True,
+    )
+    for found, expected in meshes:
+        off = np.abs(found.force - expected.force)
+        assert off.max() < 1e-3 * expected.force.mean()
+        assert np.mean(found.pinion_tooth == expected.pinion_tooth) > 0.995
+        assert np.mean(found.wheel_tooth == expected.wheel_tooth) > 0.995
+        assert np.median(np.abs(found.load_share - expected.load_share)) < 1e-3
+        assert np.allclose(found.load_share.sum(axis=0)[~found.contact_lost], 1.0)
+
+
+def test_a_record_does_not_depend_on_its_neighbours(helical):
+    runs = [
+        run_of(helical),
+        run_of(helical, (one("crack", tooth=4),)),
+        run_of(helical, (MissingTooth(gear="wheel", tooth=7),)),
+    ]
+    together = recorded(*runs)
+    for run, record in zip(runs, together, strict=True):
+        (alone,) = recorded(run)
+        assert alone.acceleration.tobytes() == record.acceleration.tobytes()
+    assert together[0].acceleration.tobytes() != together[1].acceleration.tobytes()
+
+
+def test_single_precision_is_nearly_as_accurate(helical):
+    """Of a record this quiet, rounding makes 7e-4."""
+    runs = [
+        run_of(with_solver(helical, precision=precision, max_error=None))
+        for precision in ("float64", "float32")
+    ]
+    double, single = (record.acceleration[None] for record in recorded(*runs))
+    assert in_band_error(single, double, RATE)[0] < 1.2e-3
+
+
+@pytest.mark.parametrize(
+    "fault", [(one("pitting", tooth=4),), MISSING], ids=["pitting", "missing"]
+)
+def test_spur_teeth_have_one_chord(fault, monkeypatch):
+    """Followed by the core of many pairs, they move as by that of three."""
+    machine = line(*SPUR)
+    run = run_of(machine, fault, specimen=specimen_of(machine), with_mesh_state=True)
+    (three,) = recorded(run)
+    monkeypatch.setattr(LineDynamics, "has_chords", True)
+    (many,) = recorded(run)
+    assert three.acceleration.tobytes() != many.acceleration.tobytes()
+    found, expected = (each.acceleration[None] for each in (many, three))
+    assert in_band_error(found, expected, RATE)[0] < 1e-3
+    assert np.mean(many.mesh.pinion_tooth == three.mesh.pinion_tooth) > 0.995
+    off = np.abs(many.mesh.force - three.mesh.force)
+    assert off.max() < 0.02 * three.mesh.force.mean()
+
+
+@pytest.fixture(scope="module")
+def mixed(tmp_path_factory):
+    """Overrides of a gearbox whose first stage is spur and whose second is helical."""
+    shipped = Path(gensig.__file__).parent.parent / "configs" / "tables"
+    table = (shipped / "two_stage_gears.csv").read_text(encoding="utf-8")
+    for gear in ("Idler gear 2,48", "Output gear,80"):
+        assert f"{gear},2,20,0" in table
+        table = table.replace(f"{gear},2,20,0", f"{gear},2,20,15")
+    file = tmp_path_factory.mktemp("mixed") / "gears.csv"
+    file.write_text(table, encoding="utf-8")
+    return [*HELICAL, "system=two_stage_gearbox", f"system.gears_csv={file}"]
+
+
+def test_a_spur_and_a_helical_stage_agree_with_the_implicit_method(mixed):
+    """Without friction, which starts a free vibration of the quiet bearing that hardly decays."""
+    machine = line(*mixed, *LOSSLESS, "mesh.friction_coefficient=0")
+    slow = with_solver(machine, backend="newmark", oversampling=40)
+    found, expected = recorded(*[run_of(each) for each in (machine, slow)])
+    for ours, theirs in zip(found.acceleration, expected.acceleration, strict=True):
+        off = np.linalg.norm(spectrum(ours) - spectrum(theirs))
+        assert off < 0.01 * np.linalg.norm(spectrum(theirs))

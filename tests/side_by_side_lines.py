@@ -1,0 +1,130 @@
+"""Lines for the two-evaluation core: a pair as a line, runs of line machines and their records."""
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+from stacked_motions import integrate, stacked
+
+from gensig.driveline.side_by_side.line_dynamics import LineDynamics
+from gensig.driveline.side_by_side.line_integration import integrate_lines
+from gensig.driveline.time.chords import sliced_pair_mesh
+from gensig.driveline.time.course import ShaftTorque, constant_speed
+from gensig.driveline.time.geared_line import GearedLine
+from gensig.driveline.time.line_mesh import pair_mesh
+from gensig.dynamics.backends.base import Integration
+from gensig.dynamics.decimation import in_band_error
+from gensig.dynamics.integrator import Solver
+from gensig.dynamics.pair import PINION_ROTATION, WHEEL_ROTATION
+from gensig.sensing.manufacturing import draw_specimen
+from gensig.systems.base import further_gears, simulate_together
+from gensig.systems.run import CleanRecord, Run, Start
+
+RATE = 51200.0
+CHANNELS = ("pinion_x", "pinion_y", "wheel_x", "wheel_y", "wheel_rotation")
+
+
+def as_line(pair):
+    """A gear pair without rotors as a line of one mesh."""
+    system, damping = pair.system(), pair.mesh_damping / pair.mesh_force
+    teeth = pair.start_tooth_pinion, pair.start_tooth_wheel
+    make = sliced_pair_mesh if pair.is_helical else pair_mesh
+    mesh = make(
+        "pair",
+        pair.table,
+        direction=pair.approach_direction(),
+        roll_dof=PINION_ROTATION,
+        damping=damping,
+        errors=(pair.pinion_error, pair.wheel_error),
+        tilts=(pair.pinion_tilt, pair.wheel_tilt),
+        start_teeth=teeth,
+        start_phase=pair.start_phase,
+    )
+    held = np.zeros(len(system.mass))
+    held[PINION_ROTATION] = math.sqrt(pair.drive_stiffness)
+    drive_damping = system.damping[PINION_ROTATION, PINION_ROTATION]
+    friction_torque = np.zeros(len(system.mass))
+    friction_torque[PINION_ROTATION] = pair.friction_torque()
+    line = GearedLine(
+        names=system.names,
+        mass=np.diag(system.mass),
+        damping=system.damping,
+        stiffness=system.stiffness,
+        rotation=system.rotation,
+        meshes=(mesh,),
+        held=held,
+        held_damping=drive_damping / pair.drive_stiffness,
+        friction_torque=friction_torque,
+    )
+    torque = pair.operating.torque
+    driven = np.array([-torque * pair.table.pair.ratio])
+    running = SimpleNamespace(
+        line=line,
+        course=constant_speed(pair.operating.speed),
+        torques=(
+            ShaftTorque(dof=PINION_ROTATION, table=np.array([torque])),
+            ShaftTorque(dof=WHEEL_ROTATION, table=driven),
+        ),
+        mesh_force=np.array([pair.mesh_force]),
+    )
+    return LineDynamics(
+        running=running,
+        pairs=(pair,),
+        touched=np.arange(6)[None],
+        senses=np.array([-1.0]),
+        angles=(PINION_ROTATION,),
+    )
+
+
+def assert_moves_as_a_line(pair, oversampling=5):
+    """Check that a pair and the line of one mesh that is made of it have one motion."""
+    solver = Solver(oversampling=oversampling, precision="float64", backend="nystroem")
+    record = {"sampling_rate": RATE, "duration": 0.05, "channels": CHANNELS}
+    expected = integrate([pair], solver, **record)
+    integration = Integration(
+        **record,
+        with_mesh_state=False,
+        oversampling=oversampling,
+        precision="float64",
+        max_error=None,
+    )
+    found = stacked(integrate_lines([as_line(pair)], integration))
+
+    assert in_band_error(found.acceleration, expected.acceleration, RATE)[0] < 1e-5
+    assert np.abs(found.angle - expected.angle).max() < 1e-7
+    assert np.abs(found.contact_loss - expected.contact_loss).max() < 1e-3
+
+
+def specimen_of(machine):
+    """A set of gears within the grade of a machine."""
+    return draw_specimen(
+        np.random.default_rng(5),
+        *machine.pair.gears.values(),
+        machine.quality,
+        others=further_gears(machine.gears, machine.meshes),
+        n_mountings=len(machine.meshes) - 1,
+    )
+
+
+def run_of(machine, faults=(), **changes):
+    """A run that begins between teeth."""
+    start = Start(tooth_pinion=3, tooth_wheel=5, phase=0.3)
+    return Run(system=machine, faults=tuple(faults), start=start, **changes)
+
+
+def recorded(*runs):
+    """Records of runs, none of which fails."""
+    records = simulate_together(runs)
+    assert all(isinstance(record, CleanRecord) for record in records), records
+    return records
+
+
+def with_solver(machine, **changes):
+    """The machine with other options of its solver."""
+    return replace(machine, solver=replace(machine.solver, **changes))
+
+
+def spectrum(signal):
+    """Spectrum of a signal of 0.1 s from 500 Hz to 15 kHz, ten hertz apart."""
+    return np.fft.rfft(signal * np.hanning(len(signal)))[50:1500]
