@@ -12,12 +12,22 @@ from gensig.dynamics.pair import PairDynamics
 
 Slope = Callable[[float, np.ndarray], np.ndarray]
 
+SOON = 1e-8  # s, over which a rate is taken
 # usual sizes: m, rad, m/s, rad/s
 LIKELY = np.repeat([1e-6, 1e-2], 6) * np.tile([1, 1, 20, 1, 1, 20], 2)
 
 
-def equations(dynamics: PairDynamics) -> tuple[Slope, np.ndarray]:
-    """y' as a function of t and y = (q, q'), and the matrix of its linear part without the mesh."""
+def equations(
+    dynamics: PairDynamics,
+    *,
+    prescribed: bool = False,
+    damped_by_stiffness: float | None = None,
+) -> tuple[Slope, np.ndarray]:
+    """y' as a function of t and y = (q, q'), and the matrix of its linear part without the mesh.
+
+    ``prescribed`` lets the mesh roll with the set speed, not with the pinion. A number of seconds
+    damps the force by that times its rate, c proportional to k, in place of the law's own damping.
+    """
     system, direction = dynamics.system(), dynamics.approach_direction()
     law, mass = law_of(dynamics), system.mass[:, None]
     radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
@@ -27,7 +37,8 @@ def equations(dynamics: PairDynamics) -> tuple[Slope, np.ndarray]:
     # motion of the mesh by state
     motion = np.zeros((4, 12))
     motion[1, :6] = motion[2, 6:] = direction
-    motion[0, 2] = motion[3, 8] = radius
+    if not prescribed:
+        motion[0, 2] = motion[3, 8] = radius
     # state by normal force, friction force, its moments, force on the roll
     forces = np.zeros((12, 5))
     forces[6:, 0] = -direction
@@ -38,9 +49,24 @@ def equations(dynamics: PairDynamics) -> tuple[Slope, np.ndarray]:
     rate = np.array([radius * speed, 0, 0, 0])
 
     def slope(t, y):
-        return free @ y + pushed + forces @ law(*(start + rate * t + motion @ y))[:5]
+        state = start + rate * t + motion @ y
+        if damped_by_stiffness is None:
+            return free @ y + pushed + forces @ law(*state)[:5]
+        force = _damped_by_rate(law, state, damped_by_stiffness)
+        return free @ y + pushed + forces @ force
 
     return slope, free
+
+
+def _damped_by_rate(law, state, seconds):
+    """Forces of the undamped law and what some seconds of their rate add, none negative."""
+    roll, approach, rate, roll_rate = state
+    force = law(roll, approach, 0.0, 0.0)[:5].copy()
+    if not force[0] > 0.0:
+        return 0.0 * force
+    later = law(roll + roll_rate * SOON, approach + rate * SOON, 0.0, 0.0)[0]
+    damped = force[0] + seconds * (later - force[0]) / SOON
+    return force * max(0.0, damped / force[0])
 
 
 def solved(

@@ -12,6 +12,7 @@ from gensig.dynamics import _layout as layout
 from gensig.dynamics._layout import CENTER, MARGIN, MOST_PAIRS, is_helical
 from gensig.dynamics._vector import (
     at,
+    chosen,
     get_row,
     inlined,
     set_row,
@@ -53,6 +54,12 @@ def motion(group, q, v, work):
     return approach, rate
 
 
+@written
+def own_turn(group, row, work):
+    """Rotation or speed of the pinion beside the nominal one, as far as the mesh follows it."""
+    return chosen(group.prescribed, spread(work, 0.0), get_row(work, row + P_TURN))
+
+
 @inlined
 def set_out(group, time, q, drive, forces, work, wide):
     """Write what stays constant over a step.
@@ -81,9 +88,11 @@ def set_out(group, time, q, drive, forces, work, wide):
         work[at(drive + layout.DRIVE_GAIN, lane, n)] = gain
         work[at(drive + layout.DRIVE_TORQUE, lane, n)] = torque
         work[at(drive + layout.DRIVE_CENTER, lane, n)] = center
+        roll = turned
         turned += center
         wide[at(layout.NOMINAL, lane, n)] = turned
-        roll = turned + work[at(q + P_TURN, lane, n)]
+        if not group.prescribed:
+            roll = turned + work[at(q + P_TURN, lane, n)]
         roll = exact[at(layout.EXACT_RADIUS, lane, n)] * roll
         roll = exact[at(layout.START_ROLL, lane, n)] + roll
         wide[at(layout.BASE, lane, n)] = roll

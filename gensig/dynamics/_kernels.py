@@ -15,6 +15,7 @@ from gensig.dynamics._equations import (
     accelerate,
     event,
     motion,
+    own_turn,
     recenter,
     set_out,
 )
@@ -151,7 +152,7 @@ def integrate(
         gain = get_row(work, drive + layout.DRIVE_GAIN)
         approach, rate = motion(group, now, now + n_dof, work)
         set_row(work, layout.WITHIN, approach + margin)
-        turning = radius * (speed + get_row(work, now + n_dof + P_TURN))
+        turning = radius * (speed + own_turn(group, now + n_dof, work))
         set_row(work, AHEAD + end, step * turning)
         if number == first_step:
             for lane in range(n):
@@ -177,7 +178,7 @@ def integrate(
         first, last = min(first, first_end), max(last, last_end)
         cover(begin, first, last, work, near)
         cover(end, first, last, work, near)
-        q_0 = get_row(work, now + P_TURN)
+        q_0 = own_turn(group, now, work)
         changed, share = zero, zero
         n_parts, part = 1, 0
         while part < n_parts:
@@ -204,9 +205,9 @@ def integrate(
                 since = offset + since
                 q, v = at_stage, at_stage + n_dof
                 approach, rate = motion(group, q, v, work)
-                deviation = get_row(work, q + P_TURN) - q_0
+                deviation = own_turn(group, q, work) - q_0
                 turned = radius * ((speed + 0.5 * gain * since) * since + deviation)
-                roll_rate = radius * (speed + gain * since + get_row(work, v + P_TURN))
+                roll_rate = radius * (speed + gain * since + own_turn(group, v, work))
                 law = mesh_law(
                     group,
                     first,

@@ -178,7 +178,7 @@ class Group(NamedTuple):
     half the distance of nodes where a column is followed by its slope, else 0: values bend
     between nodes as their slopes say. ``tooth_row`` is the row of every tooth (-1 for a missing
     one), ``tooth_error`` its gap in m at the pitch point, ``tooth_tilt`` the growth of that gap
-    along the path in m/m.
+    along the path in m/m. ``prescribed`` meshes roll by the nominal rotation, not the pinion's.
 
     The machine is M q'' + C q' + K q = f + mesh forces; q is the deviation from nominal rotation
     and begins with pinion x, y, rotation, wheel x, y, rotation. The state is q less ``rest``
@@ -205,6 +205,7 @@ class Group(NamedTuple):
     tooth_tilt: Any
     one_sided: bool
     consistent: bool
+    prescribed: bool
     reach: Any
     inverse_mass: Any
     stiffness: Any

@@ -129,6 +129,7 @@ def pack(
         tooth_tilt=of_teeth("tilt"),
         one_sided=options.law == "one_sided",
         consistent=options.roll_torque == "consistent",
+        prescribed=options.phase == "prescribed",
         reach=side_by_side(reach),
         inverse_mass=side_by_side(1.0 / mass),
         stiffness=side_by_side(stiffness[:, dofs, dofs]),

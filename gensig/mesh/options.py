@@ -18,6 +18,7 @@ CHOICES = {
     "crack": ("calibrated", "paper"),
     "bending": ("by_slice", "whole"),
     "roll_torque": ("consistent", "classical"),
+    "phase": ("rotation", "prescribed"),
 }
 
 SLICE_COUPLINGS = ("coupled", "independent")
@@ -61,6 +62,8 @@ class MeshOptions:
     roll_torque : ``consistent`` keeps the energy balance where compliance and gap change with roll
         angle,
         ``classical`` leaves that torque out
+    phase : of the mesh follows the pinion's own ``rotation``, or is ``prescribed``, that of the set
+        speed, as in equations with a given k(t); that goes with ``law=paper``
     damping_ratio : of the mesh mode at the mean mesh stiffness
     friction_coefficient : of the flanks; its sign passes through zero over ``friction_transition``
         base pitches
@@ -76,6 +79,7 @@ class MeshOptions:
     crack: str
     bending: str
     roll_torque: str
+    phase: str
     damping_ratio: float
     friction_coefficient: float
     friction_transition: float
@@ -88,6 +92,11 @@ class MeshOptions:
                 raise ConfigError(
                     f"mesh.{key} = {getattr(self, key)!r}; allowed: {', '.join(allowed)}"
                 )
+        if self.phase == "prescribed" and self.law != "paper":
+            raise ConfigError(
+                f"mesh.phase = prescribed goes with mesh.law = paper, not {self.law}: the law of "
+                "one-sided contact follows the rotation of the gears; take mesh.phase=rotation"
+            )
         _require_range(self, "damping_ratio", 0.0, 1.0)
         _require_range(self, "friction_coefficient", 0.0, 0.5)
         _require_range(self, "friction_transition", 1e-3, 0.5)

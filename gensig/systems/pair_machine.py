@@ -241,6 +241,7 @@ def _kind(run: PairRun) -> tuple[object, ...]:
         system.solver,
         system.mesh.law,
         system.mesh.roll_torque,
+        system.mesh.phase,
     )
 
 

@@ -156,6 +156,29 @@ class TestPapersLaw:
         shown = motions([other], "nystroem", 32)
         assert in_band_error(shown.acceleration, exact.acceleration[:1], RATE)[0] > 5e-3
 
+    def test_with_the_phase_prescribed_the_motion_is_proportional_to_the_torque(
+        self, machine, dynamics_of
+    ):
+        """The equations are linear then; by the own rotation they are not."""
+        found = {}
+        for phase in ("prescribed", "rotation"):
+            words = {**QUICK, **PAPER, "mesh.phase": phase}
+            pairs = [
+                dynamics_of(machine({**words, TORQUE: torque}), MISSING)
+                for torque in (5, 40)
+            ]
+            found[phase] = motions(pairs, "nystroem", 16).acceleration
+        small, large = found["prescribed"]
+        assert np.allclose(large, 8.0 * small, rtol=0.0, atol=1e-6 * large.std())
+        small, large = found["rotation"]
+        assert np.std(large - 8.0 * small) > 0.1 * large.std()
+
+    def test_both_methods_prescribe_the_phase(self, machine, dynamics_of):
+        words = {**QUICK, **PAPER, "mesh.phase": "prescribed"}
+        pairs = [dynamics_of(machine(words), MISSING)]
+        found, exact = (motions(pairs, name, 32) for name in method_names())
+        assert error(found, exact).max() < 2e-3
+
 
 def method_names():
     """The two methods of gear pairs."""

@@ -183,6 +183,11 @@ def test_shared_compliance_only_when_coupled(xiamen, paper_machine):
             "mesh.roll_torque = ''; allowed: consistent, classical",
         ),
         (
+            "phase",
+            "x",
+            "mesh.phase = 'x'; allowed: rotation, prescribed",
+        ),
+        (
             "damping_ratio",
             -0.1,
             "mesh.damping_ratio = -0.1 must lie in 0..1",
@@ -208,3 +213,10 @@ def test_options_out_of_range(xiamen, key, value, text):
     with pytest.raises(ConfigError) as caught:
         replace(xiamen.mesh, **{key: value})
     assert str(caught.value) == text
+
+
+def test_a_prescribed_phase_goes_with_the_papers_law(xiamen):
+    text = "mesh.phase = prescribed goes with mesh.law = paper, not one_sided"
+    with pytest.raises(ConfigError, match=text):
+        replace(xiamen.mesh, phase="prescribed")
+    assert replace(xiamen.mesh, law="paper", phase="prescribed").phase == "prescribed"

@@ -350,6 +350,7 @@ def test_paper_experiment_means_every_convention_of_the_paper_and_no_noise():
     mesh = read_system(config).mesh
     expected = {
         "law": "paper",
+        "phase": "prescribed",
         "pair_coupling": "sum",
         "contact": "linear",
         "elasticity": "plane_stress",
@@ -359,7 +360,8 @@ def test_paper_experiment_means_every_convention_of_the_paper_and_no_noise():
         "bending": "whole",
     }
     assert {key: getattr(mesh, key) for key in expected} == expected
-    words = ["mesh.law=paper", "mesh.pair_coupling=sum", "mesh.contact=linear"]
+    words = ["law=paper", "phase=prescribed", "pair_coupling=sum", "contact=linear"]
+    words = [f"mesh.{word}" for word in words]
     assert read_system(read_request(words).config).mesh == mesh
     assert read_system(read_request([]).config).mesh.elasticity == "plane_strain"
 

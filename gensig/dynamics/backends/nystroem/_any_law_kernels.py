@@ -7,7 +7,14 @@ The motions are those of ``_motion``; tables and law are those of the classical 
 from __future__ import annotations
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._equations import P_TURN, accelerate, motion, recenter, set_out
+from gensig.dynamics._equations import (
+    P_TURN,
+    accelerate,
+    motion,
+    own_turn,
+    recenter,
+    set_out,
+)
 from gensig.dynamics._kernels import (
     keep_begin,
     near_pairs,
@@ -128,8 +135,8 @@ def integrate(
         apart = where_above(normal * normal, zero, zero, one)
         set_row(lost, 0, get_row(lost, 0) + apart)
         # the roll at the end of the step, with every force in it, and the tables there
-        turning = gain + get_row(work, now + P_TURN)
-        turning = speed + get_row(work, v + P_TURN) + (0.5 * step) * turning
+        turning = gain + own_turn(group, now, work)
+        turning = speed + own_turn(group, v, work) + (0.5 * step) * turning
         set_row(work, AHEAD + end, step * radius * turning)
         roll_ahead(end, work, wide)
         set_row(work, layout.FLAGS, one)
@@ -148,12 +155,12 @@ def integrate(
         if is_helical(group):
             chords_between(begin, end, MIDDLE, first, last, work)
         # the middle of the step
-        q_0 = get_row(work, q + P_TURN)
+        q_0 = own_turn(group, q, work)
         go_to_middle(step, n_dof, n_rows, work)
         halfway, rate = motion(group, middle_q, middle_v, work)
         turned = (0.5 * step) * (speed + (0.25 * step) * gain)
-        turned = radius * (turned + (get_row(work, middle_q + P_TURN) - q_0))
-        roll_rate = speed + (0.5 * step) * gain + get_row(work, middle_v + P_TURN)
+        turned = radius * (turned + (own_turn(group, middle_q, work) - q_0))
+        roll_rate = speed + (0.5 * step) * gain + own_turn(group, middle_v, work)
         law = mesh_law(
             group,
             first,
@@ -174,8 +181,8 @@ def integrate(
             set_row(work, layout.PAIR_FORCE + k, zero)
         approach, rate = motion(group, end_q, end_v, work)
         turned = step * (speed + (0.5 * step) * gain)
-        turned = radius * (turned + (get_row(work, end_q + P_TURN) - q_0))
-        roll_rate = speed + step * gain + get_row(work, end_v + P_TURN)
+        turned = radius * (turned + (own_turn(group, end_q, work) - q_0))
+        roll_rate = speed + step * gain + own_turn(group, end_v, work)
         law = mesh_law(
             group,
             first,
@@ -271,7 +278,7 @@ def start(group, begin, fresh, approach, rate, work, wide, near):
         zero,
         approach,
         rate,
-        radius * (roll_rate + get_row(work, v + P_TURN)),
+        radius * (roll_rate + own_turn(group, v, work)),
         work,
         wide,
     )
