@@ -22,6 +22,7 @@ CHOICES = {
 }
 
 SLICE_COUPLINGS = ("coupled", "independent")
+MOST_SLICES = 1000
 
 # conventions that null stands for, by law
 CONVENTIONS = {
@@ -127,7 +128,7 @@ class SliceOptions:
                 f"mesh.slice_coupling = {self.slice_coupling!r}; allowed: "
                 f"{', '.join(SLICE_COUPLINGS)}"
             )
-        _require_range(self, "n_slices", 1, 1000)
+        _require_range(self, "n_slices", 1, MOST_SLICES)
         _require_range(self, "coupling_modules", 0.0, 10.0)
 
 

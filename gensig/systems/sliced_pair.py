@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -154,6 +154,21 @@ class SlicedPair:
             load_share=load / load.sum(axis=1, keepdims=True),
             bearing=float(bearing),
         )
+
+    def pressure_error(self, result: TransmissionError) -> float:
+        """Estimated relative error of the largest pressure of sound flanks by the slices' width.
+
+        Twice the change from half as many slices. On unmodified flanks the largest pressure is at
+        the corners of the face, where it grows with about the power 0.75 of the number of slices;
+        the rest of the way is then 1.5 times that change. NaN for a single slice.
+        """
+        half = self.slices.n_slices // 2
+        if half < 1:
+            return float("nan")
+        coarse = replace(self, slices=replace(self.slices, n_slices=half))
+        pressure = float(result.pressure.max())
+        other = float(coarse.transmission_error().pressure.max())
+        return 2.0 * abs(pressure - other) / pressure
 
     def single_pair(self, n_positions: int = 401) -> tuple[Array, Array]:
         """Positions s of the first slice in m, and stiffness of one pair there, N/m.

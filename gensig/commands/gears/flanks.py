@@ -24,10 +24,12 @@ from gensig.commands.request import read_configuration
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.geometry.contact import GearPair
+from gensig.mesh.options import MOST_SLICES
 from gensig.options.configuration import Configuration
 from gensig.systems.registry import read_sliced_pair
 from gensig.systems.sliced_pair import SlicedPair, TransmissionError
 
+TOLERATED = 0.01  # error of a pressure that is not told
 LOST_SHARE = 0.02  # of the bearing field; less is the edge of the reliefs
 # Of the highest stiffness of a pair; less is one slice that enters or leaves.
 LEAST_SHARE = 0.05
@@ -43,7 +45,9 @@ def transmission_error(arguments: Namespace) -> int:
         if faults:
             result = system.transmission_error(faults)
         _warn_of_lost_contact(system, sound)
+        pressure_error = system.pressure_error(sound)
     content = transmission_error_content(system, result)
+    content["max_contact_pressure_error"] = pressure_error
     if faults:
         content["fault_adds_um"] = added_um(sound, result)
 
@@ -57,11 +61,25 @@ def transmission_error(arguments: Namespace) -> int:
     print(f"peak to peak               {content['peak_to_peak_um']:.4f} um")
     print(f"mesh orders 1 to 4         {orders} um")
     print(f"largest line load          {content['max_line_load_n_per_mm']:.2f} N/mm")
-    print(f"largest contact pressure   {content['max_contact_pressure_mpa']:.1f} MPa")
+    pressure = f"{content['max_contact_pressure_mpa']:.1f} MPa"
+    print(f"largest contact pressure   {pressure}{_with_error(system, pressure_error)}")
     if faults:
         _print_periods(result)
         print(f"the fault adds             {span(content['fault_adds_um'], '.4g')} um")
     return 0
+
+
+def _with_error(system: SlicedPair, error: float) -> str:
+    """Remark on a pressure whose slices are too wide for it."""
+    n_slices = system.slices.n_slices
+    if error <= TOLERATED:
+        return ""
+    if not error > TOLERATED:
+        return f", error unknown with {n_slices} slice"
+    remark = f", within about {error:.0%} with {n_slices} slices"
+    if 2 * n_slices > MOST_SLICES:
+        return remark
+    return f"{remark}; mesh.n_slices={min(4 * n_slices, MOST_SLICES)} is nearer"
 
 
 def added_um(sound: TransmissionError, faulty: TransmissionError) -> NDArray[Any]:

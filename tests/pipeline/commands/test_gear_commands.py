@@ -78,6 +78,18 @@ def test_own_config_dir_adds_options(gensig, tmp_path):
     assert 0.5 < float(result[2]) / float(result[1]) < 1.0
 
 
+@pytest.mark.parametrize(
+    ("n_slices", "told"),
+    [
+        (8, r", within about \d+% with 8 slices; mesh.n_slices=32 is nearer"),
+        (1, ", error unknown with 1 slice"),
+    ],
+)
+def test_a_pressure_whose_slices_are_too_wide_says_so(gensig, n_slices, told):
+    said, _ = gensig(f"transmission-error system=helical_pair mesh.n_slices={n_slices}")
+    assert re.search(f"largest contact pressure .* MPa{told}\n", said)
+
+
 def test_transmission_error_writes_what_it_promises(written, drawn, capsys):
     content = written(f"transmission-error {FAST} --plot te.png")
     printed = capsys.readouterr()
@@ -87,7 +99,8 @@ def test_transmission_error_writes_what_it_promises(written, drawn, capsys):
     assert content["roll_angle_deg"][-1] < 360 / 61
     assert content["max_line_load_n_per_mm"] == np.max(content["line_load_n_per_mm"])
     assert f"{content['mean_um']:.4f} um" in printed.out
-    assert f"{content['max_contact_pressure_mpa']:.1f} MPa" in printed.out
+    assert f"{content['max_contact_pressure_mpa']:.1f} MPa\n" in printed.out
+    assert content["max_contact_pressure_error"] < 0.01
     assert printed.err == ""
     error, orders, load, sharing, scale = drawn[0].values()
     assert f"{ripple:.3g} um from peak to peak" in error.get_title()

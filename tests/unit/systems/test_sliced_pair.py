@@ -50,6 +50,35 @@ def test_harmonics_and_shares_are_those_of_the_curve(helical):
     assert 0.9 < result.bearing <= 1.0
 
 
+def test_coupled_slices_leave_a_ripple_at_an_overlap_of_one():
+    """The slices at the ends of the face are softer; independent ones are all alike."""
+    pair = pair_of().pair
+    width = 1e3 * min(gear.face_width for gear in pair.gears.values())
+    words = [
+        f"gear.{name}.face_width_mm={width / pair.overlap_ratio}" for name in pair.gears
+    ]
+    ripple = {}
+    for coupling in ("coupled", "independent"):
+        one = pair_of(*words, f"mesh.slice_coupling={coupling}")
+        assert_close(one.pair.overlap_ratio, 1.0, 1e-9)
+        ripple[coupling] = np.ptp(one.transmission_error().error)
+    assert ripple["independent"] < 2e-9 < 30e-9 < ripple["coupled"]
+
+
+def test_the_error_of_the_largest_pressure_is_estimated():
+    """At the corners of plain flanks it is large; inside of modified ones it is small."""
+    exact = pair_of("mesh.n_slices=320").transmission_error().pressure.max()
+    plain = pair_of("mesh.n_slices=40")
+    result = plain.transmission_error()
+    missing = 1.0 - result.pressure.max() / exact
+    assert missing > 0.05
+    assert missing < plain.pressure_error(result) < 2.0 * missing
+    modified = pair_of("mesh.n_slices=20", "modification=beihang_both")
+    assert modified.pressure_error(modified.transmission_error()) < 0.002
+    single = pair_of("mesh.n_slices=1")
+    assert np.isnan(single.pressure_error(single.transmission_error()))
+
+
 def test_a_relief_deeper_than_the_deflection_loses_contact(helical):
     relief = FlankModification(tip_relief=100e-6, tip_relief_height=1e-3)
     deep = replace(helical.modification, pinion=relief)
