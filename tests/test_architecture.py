@@ -59,7 +59,8 @@ def test_import_is_light(statement: str, absent: tuple[str, ...]) -> None:
 GENSIG = {
     "cli": "commands terminal version",
     "commands": "dataset driveline dynamics errors execution faults geometry life mesh "
-    "operation options plan production record report signals systems text twin units",
+    "operation options papers plan production record report signals systems text twin "
+    "units",
     "dataset": "errors signals version",
     "driveline": (
         "dynamics errors faults geometry life material mesh operation options sensing "
@@ -74,6 +75,7 @@ GENSIG = {
     "mesh": "errors geometry material options units",
     "operation": "errors options text units",
     "options": "errors text units",
+    "papers": "dynamics faults life operation options sensing signals systems units",
     "plan": (
         "dataset errors faults geometry life mesh operation options record systems "
         "units"

@@ -109,6 +109,24 @@ MACHINE_VERBS = {
         instead=FILES_INSTEAD,
         reads={SPUR: (*RUNNING, "strength"), OTHERS: (*GEARS, "quality", "strength")},
     ),
+    "figures": Verb(
+        summary="figures of the papers, ours beside the printed numbers, as PNG and CSV",
+        examples=(
+            "gensig figures helical_heat --dir runs/figures",
+            "gensig figures spur 8 14 --dir runs/figures",
+        ),
+        runs="gensig.commands.paper_figures:figures",
+        arguments=(
+            text("paper", "PAPER", "spur, helical_heat, helical_error or wear"),
+            text(
+                "numbers",
+                "FIGURE",
+                "numbers of its figures (default: all that simulation can draw)",
+                nargs="*",
+            ),
+            text("--dir", "DIR", "folder for the files", required=True),
+        ),
+    ),
     "wear-life": Verb(
         summary="how long flanks last until they are worn, and what their wear looks like",
         examples=(

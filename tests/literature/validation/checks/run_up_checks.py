@@ -12,22 +12,15 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics.response import accelerations
 from gensig.options.compose import compose
-from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
+from gensig.papers.error_paper import SPEEDS_RPM, run_up_level
 from gensig.systems.helical_pair import HelicalPair
-from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.registry import read_helical_pair
-from gensig.systems.run import Run
-from gensig.units import to_si
 
 Array = NDArray[np.float64]
 
 GROUP = "modification="
 VARIANTS = ("beihang_least_ripple", "beihang_even_load", "beihang_both")
-SPEEDS_RPM = np.arange(250.0, 5001.0, 50.0)
-N_ORDERS = 3  # of the mesh frequency, up to 15 kHz at the highest speed
-CHANNELS = ("pinion_y", "pinion_z", "wheel_y", "wheel_z")
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,33 +32,8 @@ class RunUpCase:
 
     @cached_property
     def level(self) -> Array:
-        """Mean square acceleration of the bearings at the mesh orders, (speed,) dB.
-
-        The static transmission error at the mean load pushes the linear machine with the mesh's
-        mean stiffness.
-        """
-        system = self.system
-        gears = system.pair.pinion, system.pair.wheel
-        run = Run(
-            system=system,
-            faults=(),
-            specimen=perfect_specimen(*gears),
-            gearbox=nominal_gearbox(len(CHANNELS)),
-        )
-        dynamics = pair_dynamics(run)
-        amplitude = system.flanks.transmission_error().harmonics[:N_ORDERS]
-        order, speed = np.arange(1, N_ORDERS + 1), to_si("speed_rpm", 1.0) * SPEEDS_RPM
-        frequency = np.outer(speed, order * system.pair.pinion.n_teeth).ravel()
-        push = dynamics.mean_mesh_stiffness * np.tile(amplitude, len(speed))
-        force = np.asarray(
-            push[:, None] * dynamics.approach_direction(), dtype=np.complex128
-        )
-        felt = accelerations(dynamics, frequency, force)[
-            :, [dynamics.dofs.index(name) for name in CHANNELS]
-        ]
-        return 10.0 * np.log10(
-            (np.abs(felt) ** 2).reshape(len(speed), -1).sum(axis=1) / 2.0
-        )
+        """Level of the bearings at the mesh orders, (speed,) dB."""
+        return run_up_level(self.system)
 
     def beside(self, variant: str | None) -> RunUpCase:
         """The same machine with another modification; None: with plain flanks."""

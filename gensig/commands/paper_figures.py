@@ -1,0 +1,53 @@
+"""``gensig figures``: the figures of a paper, ours beside what is printed."""
+
+from __future__ import annotations
+
+import textwrap
+from argparse import Namespace
+from pathlib import Path
+
+from gensig.commands.console import one_line_warnings, replaced_file
+from gensig.errors import ConfigError
+
+WIDTH = 90  # letters of a line of a reason
+
+
+def figures(arguments: Namespace) -> int:
+    """Write a PNG and a CSV for every figure asked for, and print what differs and why.
+
+    Raises
+    ------
+    ConfigError    for an unknown paper or figure
+    """
+    from gensig.commands.figures.paper_drawing import draw_paper_figure
+    from gensig.papers.registry import PAPERS
+
+    if arguments.paper not in PAPERS:
+        raise ConfigError(
+            f"gensig figures {arguments.paper}: no such paper; take one of {', '.join(PAPERS)}"
+        )
+    paper = PAPERS[arguments.paper]
+    numbers = arguments.numbers or list(paper.figures)
+    for number in numbers:
+        if number not in paper.figures:
+            raise ConfigError(
+                f"gensig figures {arguments.paper} {number}: simulation draws figures "
+                f"{', '.join(paper.figures)} of this paper"
+            )
+    folder = Path(arguments.dir)
+    folder.mkdir(parents=True, exist_ok=True)
+    print(paper.title)
+    for number in numbers:
+        with one_line_warnings("gensig"):
+            figure = paper.figures[number]()
+        stem = folder / f"{arguments.paper}_{number}"
+        with (
+            replaced_file(stem.with_suffix(".csv")) as path,
+            path.open("w", encoding="utf-8", newline="") as file,
+        ):
+            figure.write_csv(file)
+        with replaced_file(stem.with_suffix(".png")) as path:
+            draw_paper_figure(figure, path)
+        print(f"{stem}.png and .csv: {figure.title}")
+        print(textwrap.indent(textwrap.fill(figure.reason, WIDTH), "    "))
+    return 0

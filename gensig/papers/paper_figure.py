@@ -1,0 +1,61 @@
+"""One figure of a paper: curves by panel, ours and printed ones."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import IO
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Curve:
+    """One curve ``y`` over ``x``, (point,) each; ``is_printed`` if the paper prints it."""
+
+    label: str
+    x: Array
+    y: Array
+    is_printed: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Panel:
+    """Curves on the same axes, with labels that have units."""
+
+    title: str
+    x_label: str
+    y_label: str
+    curves: tuple[Curve, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PaperFigure:
+    """A figure of a paper, and the reason where ours differs from what is printed."""
+
+    title: str
+    panels: tuple[Panel, ...]
+    reason: str = ""
+
+    def write_csv(self, file: IO[str]) -> None:
+        """Write a line for every point: panel, curve, whether it is printed, x, y."""
+        writer = csv.writer(file)
+        writer.writerow(["panel", "curve", "is_printed", "x", "x_is", "y", "y_is"])
+        for panel in self.panels:
+            for curve in panel.curves:
+                for x, y in zip(curve.x, curve.y, strict=True):
+                    point = f"{x:.10g}", panel.x_label, f"{y:.10g}", panel.y_label
+                    printed = int(curve.is_printed)
+                    writer.writerow([panel.title, curve.label, printed, *point])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paper:
+    """A paper: its title, and its figures by number as functions that compute them."""
+
+    title: str
+    figures: Mapping[str, Callable[[], PaperFigure]]

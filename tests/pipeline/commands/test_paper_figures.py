@@ -1,0 +1,102 @@
+"""``gensig figures``: every figure of every paper, with the numbers that the papers print."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gensig.cli import main
+from gensig.papers.registry import PAPERS
+
+LITERATURE = Path(__file__).parents[2] / "literature" / "validation"
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Folder with the files of a paper, by its name; each is made once."""
+    folder = tmp_path_factory.mktemp("figures")
+    done = set()
+
+    def make(paper):
+        if paper not in done:
+            assert main(["figures", paper, "--dir", str(folder)]) == 0
+            done.add(paper)
+        return folder
+
+    return make
+
+
+def points(folder, stem):
+    """Curves of a file: (x, y) by panel and label, and the labels that are printed ones."""
+    curves, printed = {}, set()
+    with (folder / f"{stem}.csv").open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            place = row["panel"], row["curve"]
+            curves.setdefault(place, []).append((float(row["x"]), float(row["y"])))
+            if row["is_printed"] == "1":
+                printed.add(row["curve"])
+    return {key: np.array(value).T for key, value in curves.items()}, printed
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+def test_every_figure_has_a_picture_and_its_points(written, paper):
+    folder = written(paper)
+    for number in PAPERS[paper].figures:
+        assert (folder / f"{paper}_{number}.png").read_bytes().startswith(b"\x89PNG")
+        curves, _ = points(folder, f"{paper}_{number}")
+        assert all(np.isfinite(xy).all() for xy in curves.values())
+
+
+@pytest.mark.parametrize(
+    ("number", "row", "rises"),
+    [
+        ("7", "sweeps.friction.0_03", False),
+        ("8", "sweeps.torque.12000", True),
+        ("9", "sweeps.speed.1200", False),
+    ],
+)
+def test_sweeps_of_hot_gears(written, number, row, rises):
+    """The first printed mean is that of the validation; by default heat softens the mesh."""
+    with (LITERATURE / "helical_heat_paper.csv").open(encoding="utf-8") as file:
+        value = {each["id"]: each["printed"] for each in csv.DictReader(file)}[row]
+    curves, printed = points(written("helical_heat"), f"helical_heat_{number}")
+    assert printed == {"printed"}
+    panel = "mesh, mean, hot"
+    assert curves[panel, "printed"][1, 0] == float(value)
+    by_paper = curves[panel, "the paper's conventions"][1]
+    assert 0.0 < by_paper[-1] / by_paper[0] - 1.0 < 1e-3
+    ours = curves[panel, "gensig's default"][1]
+    assert (ours[-1] > ours[0]) == rises
+
+
+def test_lives_fall_with_the_speed_and_the_root_of_the_torque(written):
+    for number, power in (("8", -0.5), ("9", -1.0)):
+        curves, printed = points(written("wear"), f"wear_{number}")
+        assert len(printed) == 1
+        x, life = curves["life to 100 um", "ours, the paper's conventions"]
+        slope = np.polyfit(np.log(x), np.log(life), 1)[0]
+        assert abs(slope - power) < 0.01
+
+
+def test_a_missing_tooth_is_an_impact_a_turn_by_the_papers_equations(written):
+    curves, _ = points(written("spur"), "spur_14")
+    highest = {
+        name: np.abs(curves["time", name][1]).max()
+        for name in ("the paper's equations", "gensig's default")
+    }
+    assert highest["the paper's equations"] > 1e5
+    assert 1e3 < highest["gensig's default"] < 5e3
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["nope"], "no such paper; take one of spur, helical_heat"),
+        (["wear", "12"], "simulation draws figures 5, 6, 8, 9 of this paper"),
+    ],
+)
+def test_what_is_not_there_is_named(tmp_path, capsys, words, told):
+    assert main(["figures", *words, "--dir", str(tmp_path / "new")]) == 2
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / "new").exists()
