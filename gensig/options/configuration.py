@@ -22,7 +22,6 @@ FIXED_KEYS = (
     "system.",
     "modification.",
     "strength.",
-    "heat.",
     "wear.",
     "life.",
     "mesh.n_slices",

@@ -12,8 +12,14 @@ from numpy.typing import NDArray
 from gensig.errors import ConfigError, GeometryError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
+from gensig.material import Material
 from gensig.mesh.sliced.slices import LoadedContact, loaded_contact
-from gensig.mesh.thermal.body_heat import BodyHeat, solved_body, uniform_body
+from gensig.mesh.thermal.body_heat import (
+    BodyHeat,
+    solved_body,
+    uniform_body,
+    warming_body,
+)
 from gensig.mesh.thermal.heat import (
     Heat,
     contact_half_width,
@@ -115,8 +121,9 @@ def hot_state(duty: Duty) -> HotState:
         speed=duty.speed,
     )
     share, cooling = heat.pinion_heat_share, heat.at_speed(duty.speed)
-    pinion = _body(system.pair.pinion, share * loss, cooling)
-    wheel = _body(system.pair.wheel, (1.0 - share) * loss, cooling)
+    material = system.material
+    pinion = _body(system.pair.pinion, share * loss, material, cooling)
+    wheel = _body(system.pair.wheel, (1.0 - share) * loss, material, cooling)
     position, flash = _flash_along_path(duty, contact)
     return HotState(
         contact=contact,
@@ -258,13 +265,15 @@ def flash_skin_growth(duty: Duty, state: HotState) -> float:
     return held * heat.expansion * float(state.flash.max()) * depth
 
 
-def _body(gear: Gear, input_heat: float, heat: Heat) -> BodyHeat:
+def _body(gear: Gear, input_heat: float, material: Material, heat: Heat) -> BodyHeat:
     temperature = getattr(heat, f"{gear.name}_temperature")
     if temperature is not None:
         body = uniform_body(gear, temperature)
     else:
         bore = getattr(heat, f"{gear.name}_bore_temperature")
         body = solved_body(gear, input_heat, heat, bore_temperature=bore)
+        if heat.running_time is not None:
+            body = warming_body(body, gear, material, heat, heat.running_time)
     for value in (body.tooth, float(body.temperature[0])):
         text = f"{gear.name}: a temperature of {value:.4g} degrees Celsius"
         heat.require_known(value, text)

@@ -1,15 +1,19 @@
-"""Steady temperature of a gear: a hollow disc heated at its teeth, cooled at teeth, faces, bore."""
+"""Temperature of a gear: a hollow disc heated at its teeth, cooled at teeth, faces and bore.
+
+Steady, or while it warms up.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
 from gensig.geometry.gear import Gear
+from gensig.material import Material
 from gensig.mesh.thermal.heat import Heat
 
 Array = NDArray[np.float64]
@@ -131,6 +135,53 @@ def solved_body(
         input=input_heat,
         to_oil=input_heat - to_bore,
         to_bore=to_bore,
+    )
+
+
+def heat_capacity(gear: Gear, material: Material, heat: Heat) -> float:
+    """Heat capacity of a disc from the bore to the pitch circle, J/K."""
+    section = math.pi * (gear.pitch_radius**2 - gear.bore_radius**2)
+    volume = section * gear.face_width
+    return material.density_kg_per_m3 * volume * heat.specific_heat
+
+
+def time_constant(gear: Gear, material: Material, heat: Heat) -> float:
+    """Time constant of one lumped mass, s: heat capacity over convection to the oil.
+
+    Infinite without convection. Source: Incropera & DeWitt, section 5.1.
+    """
+    cooling = heat.face_convection * face_surface(gear)
+    cooling += heat.tooth_convection * tooth_surface(gear)
+    if cooling == 0.0:
+        return math.inf
+    return heat_capacity(gear, material, heat) / cooling
+
+
+def warming_body(
+    steady: BodyHeat, gear: Gear, material: Material, heat: Heat, running_time: float
+) -> BodyHeat:
+    """A gear some seconds after it began to run at the reference temperature.
+
+    Its whole field goes to the steady one with one time constant; oil and housing have their
+    temperatures from the begin.
+
+    Raises
+    ------
+    ConfigError    for a gear that no convection cools
+    """
+    constant = time_constant(gear, material, heat)
+    if constant == math.inf:
+        raise ConfigError(
+            f"{gear.name}: heat.running_time_s needs convection, which gives the time that "
+            "warming takes; give heat.face_convection_w_per_m2k or "
+            "heat.tooth_convection_w_per_m2k, or heat.running_time_s=null"
+        )
+    left, start = math.exp(-running_time / constant), heat.reference_temperature
+    rate = (steady.mean - start) / constant * left
+    return replace(
+        steady,
+        temperature=start + (steady.temperature - start) * (1.0 - left),
+        to_oil=steady.to_oil - rate * heat_capacity(gear, material, heat),
     )
 
 

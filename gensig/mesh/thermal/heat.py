@@ -34,6 +34,7 @@ class Heat:
     reference_temperature, oil_temperature, housing_temperature : degrees Celsius
     pinion_temperature, wheel_temperature : of the whole gear; None: from friction heat and cooling
     pinion_bore_temperature, wheel_bore_temperature : None: no heat through the bore
+    running_time : s    since gears at the reference temperature began to run; None: steady
     face_convection, tooth_convection : W/(m2 K)    from body faces and teeth to the oil
     convection_speed : rad/s    pinion speed of both values, which go with the root of the speed
         (thermal paper, eq. 34); None: they hold at any speed
@@ -52,6 +53,7 @@ class Heat:
     wheel_temperature: float | None = unit("degc")
     pinion_bore_temperature: float | None = unit("degc")
     wheel_bore_temperature: float | None = unit("degc")
+    running_time: float | None = unit("s")
     face_convection: float = unit("w_per_m2k")
     tooth_convection: float = unit("w_per_m2k")
     convection_speed: float | None = unit("rpm")
@@ -76,6 +78,11 @@ class Heat:
                 raise ConfigError(
                     f"heat.{key} = {from_si(key, value):g} must lie in {low:g}..{high:g}"
                 )
+        if self.running_time is not None and not self.running_time >= 0.0:
+            raise ConfigError(
+                f"heat.running_time_s = {self.running_time:g} must not be negative, or null for "
+                "gears that are as warm as they get"
+            )
         if self.convection_speed is not None and not self.convection_speed > 0.0:
             raise ConfigError(
                 "heat.convection_speed_rpm = "

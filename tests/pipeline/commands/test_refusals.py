@@ -108,7 +108,6 @@ REFUSED = {
     f"gensig plan {uniform('operating.sped_rpm')}": "'operating.speed_rpm'",
     f"gensig plan {uniform('mesh.law')}": "mesh.law",
     f"gensig plan {uniform('gear.backlash_um')}": "-m",
-    f"gensig plan {uniform('heat.oil_temperature_degc')}": "one value for a whole data set",
     f"gensig plan {uniform('strength.bending_limit_mpa')}": "is one value for a whole data set",
     f"gensig plan {uniform('wear.threshold_um')}": "one value for a whole data set",
     "gensig plan wear.rule=rust": "wear.rule = 'rust'; allowed: band, fixed_intervals",

@@ -11,6 +11,7 @@ from refusals import refused
 
 from gensig.errors import ConfigError, ExtrapolationError, GeometryError
 from gensig.mesh.modification import FlankModification
+from gensig.mesh.thermal.body_heat import heat_capacity, time_constant
 from gensig.options.compose import compose
 from gensig.systems.hot_pair import (
     as_configured,
@@ -306,3 +307,64 @@ def test_linear_law_takes_softening_without_growth():
     pair = spur_of(*words)
     assert pair.modification.growth is None
     assert pair.material.youngs_modulus < spur_of(heat="none").material.youngs_modulus
+
+
+class TestWarmingUp:
+    """Gears some time after they began to run at the reference temperature."""
+
+    def bodies(self, *words):
+        state = hot_state(duty_of(*words))
+        return state.pinion, state.wheel
+
+    def test_they_begin_cold_and_end_steady(self):
+        for body in self.bodies("heat.running_time_s=0"):
+            assert_close(body.temperature, 20.0, 1e-12)
+        late, steady = self.bodies("heat.running_time_s=1e5"), self.bodies()
+        for one, other in zip(late, steady, strict=True):
+            assert_close(one.temperature, other.temperature, 1e-9)
+            assert_close(one.to_oil, other.to_oil, 1e-9)
+
+    def test_heat_that_does_not_leave_warms_the_body(self):
+        """Input less output over the heat capacity is the change of the mean temperature."""
+        duty = duty_of("heat.running_time_s=300")
+        pair, material = duty.system.pair, duty.system.material
+        before, now, after = (
+            self.bodies(f"heat.running_time_s={time}") for time in (299, 300, 301)
+        )
+        for side, gear in enumerate((pair.pinion, pair.wheel)):
+            change = 0.5 * (after[side].mean - before[side].mean)
+            body = now[side]
+            stored = body.input - body.to_oil - body.to_bore
+            found = stored / heat_capacity(gear, material, duty.heat)
+            assert found > 0.01
+            assert_close(found, change, 1e-5)
+
+    def test_a_small_gear_is_warm_first(self):
+        duty = duty_of()
+        cooling = duty.heat.at_speed(duty.speed)
+        pinion, wheel = (
+            time_constant(gear, duty.system.material, cooling)
+            for gear in (duty.system.pair.pinion, duty.system.pair.wheel)
+        )
+        assert 60.0 < pinion < 0.7 * wheel < 3600.0
+
+    def test_refusals(self):
+        with refused("heat.running_time_s = -1 must not be negative"):
+            duty_of("heat.running_time_s=-1")
+        words = [*UNCOOLED, "heat.pinion_bore_temperature_degc=60"]
+        words.append("heat.wheel_bore_temperature_degc=60")
+        with refused("pinion: heat.running_time_s needs convection"):
+            self.bodies(*words, "heat.running_time_s=10")
+
+
+def test_a_plan_varies_heat():
+    """Records of one set are cold, warming and hot."""
+    config = config_of()
+    warm = config.with_values({"heat.running_time_s": 120.0})
+    assert read_duty(warm).heat.running_time == 120.0
+    hotter = config.with_values({"heat.oil_temperature_degc": 80.0})
+    rise = (
+        hot_state(read_duty(hotter)).pinion.tooth
+        - hot_state(read_duty(config)).pinion.tooth
+    )
+    assert_close(rise, 20.0, 0.05)
