@@ -142,6 +142,7 @@ MACHINE_VERBS = {
         examples=(
             "gensig simulate fault=missing_tooth operating.speed_rpm=1500"
             " --plot missing.png --output missing.csv",
+            "gensig simulate operating=ramp --plot run_up.png --orders run_up.csv",
             "gensig simulate --from runs/quickstart --record 7 --twin --output twin.h5",
         ),
         runs="gensig.commands.gears.simulate:simulate",
@@ -164,7 +165,13 @@ MACHINE_VERBS = {
             text(
                 "--plot",
                 "FILE",
-                "write a figure: signal, spectrum, envelope spectrum",
+                "write a figure: signal, spectrum, envelope spectrum; where the speed changes by "
+                "more than 5 %, order map, waterfall with natural frequencies, order cuts",
+            ),
+            text(
+                "--orders",
+                "FILE",
+                "of a run-up: write the RMS of every order over the speed (.csv)",
             ),
         ),
         status_1="the record did not stay finite, or its solver gave up; nothing is written",

@@ -44,6 +44,11 @@ class LevelMap:
         """
         return self.rms[..., int(np.abs(self.axis - place).argmin())]
 
+    def around(self, place: float, reach: float) -> FloatArray:
+        """Median of the bins within a reach of a place of the axis, (..., frame): its floor."""
+        near = np.abs(self.axis - place) <= reach
+        return np.asarray(np.median(self.rms[..., near], axis=-1))
+
     def up_to(self, place: float) -> LevelMap:
         """The part of the map up to a place of its axis."""
         kept = self.axis <= place

@@ -1,0 +1,236 @@
+"""Run-ups of ``gensig simulate``: levels of orders over speed beside the natural frequencies."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.commands.figures.machine_figures import shown_channel
+from gensig.driveline.machine import LineMachine
+from gensig.dynamics.response import natural_frequencies
+from gensig.errors import ConfigError
+from gensig.options.configuration import Configuration
+from gensig.record.simulate import Record
+from gensig.signals.resampling import PASS_SHARE
+from gensig.signals.run_up.level_map import LevelMap, decibels, peaks_over_speed
+from gensig.signals.run_up.speed_maps import (
+    LEAST_CHANGE,
+    frequency_map,
+    order_map,
+    speed_change,
+)
+from gensig.systems.base import Machine
+from gensig.systems.pair_machine import GearPairMachine, pair_dynamics
+from gensig.systems.run import Run
+from gensig.units import channel_unit, from_si
+
+ACCELERATION_REFERENCE = 1e-6  # m/s2, ISO 1683
+HARMONICS = 3  # of the followed mesh
+MOST_CUTS = 5
+MARGIN = 1.1  # of the highest order and frequency in the figure
+MOST_DAMPING = (
+    0.5  # of a mode; above it a resonance, 1 / (2 damping), magnifies nothing
+)
+LEAST_STANDING = 10.0  # dB of a peak over the median of the orders around it; assumed
+REACH = 4.0  # orders on either side of it
+RPM = from_si("speed_rpm", 1.0)
+TRACES = ("shaft_speed", "torque_set")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mode:
+    """A natural frequency, Hz, with its damping ratio and its name in the figure."""
+
+    name: str
+    frequency: float
+    damping_ratio: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RunUp:
+    """Levels of one channel of a record whose speed changes.
+
+    Attributes
+    ----------
+    channel, shaft : names of the channel, and of the gear on whose shaft speed and orders are
+    orders : over the orders of that shaft
+    waterfall : over frequency, Hz
+    cuts : order of every mesh and harmonic, by its name
+    modes : natural frequencies in the band that can resonate, lowest first
+    """
+
+    channel: str
+    shaft: str
+    orders: LevelMap
+    waterfall: LevelMap
+    cuts: Mapping[str, float]
+    modes: tuple[Mode, ...]
+
+    @property
+    def unit(self) -> str:
+        """Unit of the channel."""
+        return channel_unit(self.channel)
+
+    @property
+    def reference(self) -> float:
+        """Reference of the levels in dB, in the unit of the channel."""
+        if self.unit == "m/s^2":
+            return ACCELERATION_REFERENCE
+        return 1.0
+
+    def level(self, rms: NDArray[Any]) -> NDArray[Any]:
+        """Level of RMS values, dB."""
+        return decibels(rms, self.reference)
+
+    def peaks(self, order: float) -> NDArray[np.intp]:
+        """Indices of the speeds at which an order peaks, `LEAST_STANDING` over its floor."""
+        level = self.level(self.orders.at(order))
+        floor = self.level(self.orders.around(order, REACH))
+        found = peaks_over_speed(level)
+        return found[level[found] > floor[found] + LEAST_STANDING]
+
+    def crossings(self, order: float) -> dict[str, float]:
+        """Speeds, r/min, at which an order meets a natural frequency, by its name."""
+        low, high = RPM * self.orders.speed[[0, -1]]
+        met = {mode.name: 60.0 * mode.frequency / order for mode in self.modes}
+        return {name: rpm for name, rpm in met.items() if low <= rpm <= high}
+
+
+def with_traces(config: Configuration) -> Configuration:
+    """The configuration of a record whose shaft speed is stored where its course is not constant.
+
+    Samples stay the same.
+    """
+    if config.section("operating").get("speed_profile") is None:
+        return config
+    return config.with_keys("dataset", store_operating=True)
+
+
+def without_traces(config: Configuration, record: Record) -> Record:
+    """A record of `with_traces` as its configuration itself makes it."""
+    if config["dataset"].get("store_operating"):
+        return record
+    signals = {
+        name: values for name, values in record.signals.items() if name not in TRACES
+    }
+    return Record(signals=signals, values=record.values)
+
+
+def read_run_up(machine: Machine, record: Record) -> RunUp | None:
+    """Levels over the speed of a record; None where the speed changes by `LEAST_CHANGE` or less.
+
+    Raises
+    ------
+    ConfigError    for a record that is too short, or whose speed changes too fast
+    """
+    if "shaft_speed" not in record.signals:
+        return None
+    rate, names = machine.sensing.sampling_rate, machine.sensing.channel_names
+    speed = record.signals["shaft_speed"].astype(np.float64)
+    angle = np.cumsum(speed) / rate
+    channel = shown_channel(names)
+    signal = record.signals["acceleration"][names.index(channel)].astype(np.float64)
+    try:
+        if speed.min() > 0.0 and speed_change(angle) <= LEAST_CHANGE:
+            return None
+        orders = order_map(signal, angle, rate)
+        frame = _frame_time(orders)
+        waterfall = frequency_map(signal, angle, rate, frame=frame)
+    except ValueError as error:
+        raise ConfigError(
+            f"no levels over speed: {error}; give a slower course of operating.speed_profile, or "
+            "a longer operating.duration_s"
+        ) from None
+    cuts = _cuts(machine)
+    highest = MARGIN * max(cuts.values())
+    usable = PASS_SHARE * rate
+    fastest = float(orders.speed.max()) / (2.0 * math.pi)
+    modes = [mode for mode in _modes(machine) if mode.frequency < usable]
+    tops = [highest * fastest, *(MARGIN * mode.frequency for mode in modes)]
+    band = min(max(tops), usable)
+    return RunUp(
+        channel=channel,
+        shaft=next(mesh.driving for mesh in machine.meshes if mesh.followed),
+        orders=orders.up_to(highest).by_speed(),
+        waterfall=waterfall.up_to(band).by_speed(),
+        cuts={name: order for name, order in cuts.items() if order < orders.axis[-1]},
+        modes=tuple(modes),
+    )
+
+
+def _frame_time(orders: LevelMap) -> float:
+    """Median length of the frames of an order map, s."""
+    turns = round(1.0 / float(orders.axis[1]))
+    return 2.0 * math.pi * turns / float(np.median(orders.speed))
+
+
+def _cuts(machine: Machine) -> dict[str, float]:
+    """Orders of the followed mesh, of its harmonics, and of other meshes."""
+    n_teeth = float(machine.pair.pinion.n_teeth)
+    cuts = {"mesh": n_teeth}
+    for harmonic in range(2, HARMONICS + 1):
+        cuts[f"{harmonic} x mesh"] = harmonic * n_teeth
+    for mesh in machine.meshes:
+        teeth = machine.gears[mesh.driving].n_teeth
+        order = teeth / machine.pinion_turns[mesh.driving]
+        is_new = all(abs(order - other) > 1e-6 * order for other in cuts.values())
+        if is_new and len(cuts) < MOST_CUTS:
+            cuts[f"mesh {mesh.driving} / {mesh.driven}"] = order
+    return cuts
+
+
+def _modes(machine: Machine) -> list[Mode]:
+    """Natural frequencies of the nominal sound machine that can resonate, lowest first."""
+    if isinstance(machine, LineMachine):
+        modes = machine.engine.drive.modes()
+        frequency, damping = modes.frequency, modes.damping_ratio
+    else:
+        assert isinstance(machine, GearPairMachine)
+        dynamics = pair_dynamics(Run(system=machine, faults=()))
+        frequency, damping = natural_frequencies(dynamics)
+    shown = np.flatnonzero((frequency > 0.0) & (damping < MOST_DAMPING))
+    return [
+        Mode(
+            name=f"f{number}",
+            frequency=float(frequency[index]),
+            damping_ratio=float(damping[index]),
+        )
+        for number, index in enumerate(shown, start=1)
+    ]
+
+
+def write_levels(run_up: RunUp, path: Path) -> None:
+    """Write RMS values of all orders of the map as a table, a row for each speed."""
+    unit = run_up.unit.replace("/", "_per_").replace("^", "")
+    orders = run_up.orders
+    header = ["speed_rpm", "time_s", f"total_{unit}"]
+    header += [f"order_{order:g}_{unit}" for order in orders.axis]
+    rpm = RPM * orders.speed
+    table = np.column_stack([rpm, orders.time, orders.total, orders.rms])
+    np.savetxt(path, table, "%.6g", ",", header=",".join(header), comments="")
+
+
+def print_run_up(run_up: RunUp) -> None:
+    """Print the range of the speed and the peaks of every mesh order."""
+    orders = run_up.orders
+    rpm = RPM * orders.speed
+    turns = 1.0 / orders.axis[1]
+    print(
+        f"run-up of the {run_up.shaft}, {rpm[0]:.0f} to {rpm[-1]:.0f} r/min, "
+        f"frames of {turns:.0f} turn(s); peaks of {run_up.channel}:"
+    )
+    for name, order in run_up.cuts.items():
+        level = run_up.level(orders.at(order))
+        peaks = [
+            f"{level[index]:.1f} dB at {rpm[index]:.0f} r/min ({order * rpm[index] / 60.0:.0f} Hz)"
+            for index in run_up.peaks(order)
+        ]
+        print(f"  order {order:g} ({name}): {', '.join(peaks) or 'none'}")
+    listed = ", ".join(f"{mode.name} {mode.frequency:.0f}" for mode in run_up.modes)
+    print(f"  natural frequencies, Hz: {listed or 'none'}")
