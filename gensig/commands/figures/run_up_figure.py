@@ -24,7 +24,7 @@ from gensig.signals.run_up.level_map import LevelMap
 RANGE = 60.0  # dB, of the colors
 MODE = "#56B4E9"
 TOGETHER = 0.035  # of an axis, within which marks share a label
-MOST_LISTED = 14  # natural frequencies
+MOST_LISTED = 11  # natural frequencies
 MOST_CURVES = 12  # natural frequencies drawn across the order map
 MOST_CROSSINGS = 20  # marked below the cuts
 
@@ -74,7 +74,7 @@ def _waterfall(figure: Any, axes: Any, run_up: RunUp) -> None:
         curve(axes, hz[shown], rpm[shown], "white", style=":", width=0.8)
     for mode in run_up.modes:
         axes.axvline(mode.frequency, color=MODE, linestyle="--", linewidth=1.0)
-    title = "Waterfall (dashed: natural frequencies, dotted: mesh orders)"
+    title = "Waterfall (dashed: natural frequencies, dotted: orders)"
     titles(axes, title, FREQUENCY, _speed(run_up), xlim=(0.0, highest))
     _top_labels(axes, {mode.name: mode.frequency for mode in run_up.modes}, highest)
 
@@ -92,7 +92,7 @@ def _cuts(axes: Any, run_up: RunUp) -> None:
         if not np.any(np.isfinite(level)):
             continue
         lowest = min(lowest, float(np.nanmin(level)))
-        curve(axes, rpm, level, color, f"{name} (order {order:g})")
+        curve(axes, rpm, level, color, name)
         peaks = run_up.peaks(order)
         axes.plot(rpm[peaks], level[peaks], "o", color=color, markersize=5)
         marks += [(float(rpm[k]), float(level[k]), color) for k in peaks]
@@ -197,7 +197,15 @@ def _key(axes: Any, cuts: Any, modes: tuple[Mode, ...]) -> None:
     """List the curves of the cuts and the natural frequencies beside them."""
     axes.set_axis_off()
     handles, labels = cuts.get_legend_handles_labels()
-    axes.legend(handles, labels, fontsize=SMALL, loc="upper left", frameon=False)
+    axes.legend(
+        handles,
+        labels,
+        fontsize=SMALL,
+        loc="upper left",
+        frameon=False,
+        labelspacing=0.3,
+        borderaxespad=0.0,
+    )
     lines = ["natural frequencies, Hz", "(damping ratio)"]
     lines += [
         f"{mode.name}  {mode.frequency:.0f} ({mode.damping_ratio:.2g})"

@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.commands.figures.machine_figures import shown_channel
+from gensig.commands.figures.motor_figures import turner
 from gensig.driveline.machine import LineMachine
 from gensig.dynamics.response import natural_frequencies
 from gensig.errors import ConfigError
@@ -28,7 +29,7 @@ from gensig.signals.run_up.speed_maps import (
 from gensig.systems.base import Machine
 from gensig.systems.pair_machine import GearPairMachine, pair_dynamics
 from gensig.systems.run import Run
-from gensig.units import channel_unit, from_si
+from gensig.units import SPEED, channel_unit, from_si
 
 ACCELERATION_REFERENCE = 1e-6  # m/s2, ISO 1683
 HARMONICS = 3  # of the followed mesh
@@ -58,10 +59,11 @@ class RunUp:
 
     Attributes
     ----------
-    channel, shaft : names of the channel, and of the gear on whose shaft speed and orders are
+    channel : its name
+    shaft : name of the gear or the node whose speed and orders are shown
     orders : over the orders of that shaft
     waterfall : over frequency, Hz
-    cuts : order of every mesh and harmonic, by its name
+    cuts : orders of the meshes or of the engine, by their labels
     modes : natural frequencies in the band that can resonate, lowest first
     """
 
@@ -132,9 +134,10 @@ def read_run_up(machine: Machine, record: Record) -> RunUp | None:
     if "shaft_speed" not in record.signals:
         return None
     rate, names = machine.sensing.sampling_rate, machine.sensing.channel_names
-    speed = record.signals["shaft_speed"].astype(np.float64)
-    angle = np.cumsum(speed) / rate
     channel = shown_channel(names)
+    shaft, ratio = _shaft(machine, channel)
+    speed = record.signals["shaft_speed"].astype(np.float64) / ratio
+    angle = np.cumsum(speed) / rate
     signal = record.signals["acceleration"][names.index(channel)].astype(np.float64)
     try:
         if speed.min() > 0.0 and speed_change(angle) <= LEAST_CHANGE:
@@ -147,20 +150,24 @@ def read_run_up(machine: Machine, record: Record) -> RunUp | None:
             f"no levels over speed: {error}; give a slower course of operating.speed_profile, or "
             "a longer operating.duration_s"
         ) from None
-    cuts = _cuts(machine)
-    highest = MARGIN * max(cuts.values())
     usable = PASS_SHARE * rate
-    fastest = float(orders.speed.max()) / (2.0 * math.pi)
     modes = [mode for mode in _modes(machine) if mode.frequency < usable]
-    tops = [highest * fastest, *(MARGIN * mode.frequency for mode in modes)]
-    band = min(max(tops), usable)
+    if _is_torsion(machine, channel):
+        cuts, highest = _torsion_cuts(machine, orders)
+        tops = []
+    else:
+        cuts = _mesh_cuts(machine)
+        highest = MARGIN * max(cuts.values())
+        tops = [MARGIN * mode.frequency for mode in modes]
+    fastest = float(orders.speed.max()) / (2.0 * math.pi)
+    band = min(max(highest * fastest, *tops, 0.0), usable)
     return RunUp(
         channel=channel,
-        shaft=next(mesh.driving for mesh in machine.meshes if mesh.followed),
+        shaft=shaft,
         orders=orders.up_to(highest).by_speed(),
         waterfall=waterfall.up_to(band).by_speed(),
         cuts={name: order for name, order in cuts.items() if order < orders.axis[-1]},
-        modes=tuple(modes),
+        modes=tuple(mode for mode in modes if mode.frequency < band),
     )
 
 
@@ -170,19 +177,50 @@ def _frame_time(orders: LevelMap) -> float:
     return 2.0 * math.pi * turns / float(np.median(orders.speed))
 
 
-def _cuts(machine: Machine) -> dict[str, float]:
-    """Orders of the followed mesh, of its harmonics, and of other meshes."""
+def _is_torsion(machine: Machine, channel: str) -> TypeGuard[LineMachine]:
+    """True for the speed of a shaft of a drive line, which shows the orders of its engine."""
+    return isinstance(machine, LineMachine) and channel.endswith(SPEED)
+
+
+def _shaft(machine: Machine, channel: str) -> tuple[str, float]:
+    """Name of the shaft whose orders are shown, and turns of the pinion during one of it.
+
+    It is the crank or the motor for the speed of a shaft, else that of the followed driving gear.
+    """
+    if _is_torsion(machine, channel):
+        return turner(machine.engine), machine.ratio
+    return next(mesh.driving for mesh in machine.meshes if mesh.followed), 1.0
+
+
+def _mesh_cuts(machine: Machine) -> dict[str, float]:
+    """Orders of the followed mesh, of its harmonics, and of other meshes, by their labels."""
     n_teeth = float(machine.pair.pinion.n_teeth)
-    cuts = {"mesh": n_teeth}
+    cuts = {f"order {n_teeth:g}, mesh": n_teeth}
     for harmonic in range(2, HARMONICS + 1):
-        cuts[f"{harmonic} x mesh"] = harmonic * n_teeth
+        order = harmonic * n_teeth
+        cuts[f"order {order:g}, {harmonic} x mesh"] = order
     for mesh in machine.meshes:
         teeth = machine.gears[mesh.driving].n_teeth
         order = teeth / machine.pinion_turns[mesh.driving]
         is_new = all(abs(order - other) > 1e-6 * order for other in cuts.values())
         if is_new and len(cuts) < MOST_CUTS:
-            cuts[f"mesh {mesh.driving} / {mesh.driven}"] = order
+            cuts[f"order {order:.4g}, {mesh.driving} / {mesh.driven}"] = order
     return cuts
+
+
+def _torsion_cuts(
+    machine: LineMachine, orders: LevelMap
+) -> tuple[dict[str, float], float]:
+    """The strongest orders of the Campbell diagram by their labels, and the highest order shown."""
+    given = [
+        order
+        for order in machine.engine.drive.campbell_orders
+        if MARGIN * order < orders.axis[-1]
+    ]
+    power = [float(np.nanmean(np.square(orders.at(order)))) for order in given]
+    strongest = np.argsort(power)[::-1][:MOST_CUTS]
+    shown = sorted(given[index] for index in strongest)
+    return {f"order {order:g}": order for order in shown}, MARGIN * max(given)
 
 
 def _modes(machine: Machine) -> list[Mode]:
@@ -231,6 +269,6 @@ def print_run_up(run_up: RunUp) -> None:
             f"{level[index]:.1f} dB at {rpm[index]:.0f} r/min ({order * rpm[index] / 60.0:.0f} Hz)"
             for index in run_up.peaks(order)
         ]
-        print(f"  order {order:g} ({name}): {', '.join(peaks) or 'none'}")
+        print(f"  {name}: {', '.join(peaks) or 'none'}")
     listed = ", ".join(f"{mode.name} {mode.frequency:.0f}" for mode in run_up.modes)
     print(f"  natural frequencies, Hz: {listed or 'none'}")
