@@ -165,8 +165,8 @@ MACHINE_VERBS = {
             text(
                 "--plot",
                 "FILE",
-                "write a figure: signal, spectrum, envelope spectrum; where the speed changes by "
-                "more than 5 %, order map, waterfall with natural frequencies, order cuts",
+                "write a figure: signal, spectrum, envelope spectrum; of a run-up: order map, "
+                "waterfall with natural frequencies, order cuts",
             ),
             text(
                 "--orders",
@@ -176,6 +176,29 @@ MACHINE_VERBS = {
         ),
         status_1="the record did not stay finite, or its solver gave up; nothing is written",
         instead={"plan": "", "executor": "", "life": "", "out": "--output"},
+    ),
+    "run-up": Verb(
+        summary="vibration over the speed of a run-up, of variants of a machine side by side",
+        examples=(
+            "gensig run-up system=helical_pair operating=ramp operating.speed_rpm=5000"
+            " --against modification=beihang_least_ripple modification=beihang_even_load"
+            " modification=beihang_both --plot modified.png",
+        ),
+        runs="gensig.commands.gears.run_up_variants:run_up",
+        arguments=(
+            *CONFIGURATION,
+            text(
+                "--against",
+                "OVERRIDE",
+                "of one more variant each, added to the others",
+                nargs="+",
+                default=[],
+            ),
+            json_file("write RMS over the speed, of all orders and of the mesh"),
+            PLOT,
+        ),
+        status_1="a record did not stay finite, or its solver gave up; nothing is written",
+        instead={"plan": "", "executor": "", "life": "", **FILES_INSTEAD},
     ),
     "stiffness": Verb(
         summary="mesh stiffness of sound and faulty teeth",

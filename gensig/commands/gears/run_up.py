@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -124,6 +125,29 @@ def without_traces(config: Configuration, record: Record) -> Record:
     return Record(signals=signals, values=record.values)
 
 
+def shaft_angle(machine: Machine, record: Record) -> NDArray[np.float64]:
+    """Angle of the pinion from its stored speed, (sample,) rad."""
+    speed = record.signals["shaft_speed"].astype(np.float64)
+    return np.cumsum(speed) / machine.sensing.sampling_rate
+
+
+def is_steady(angle: NDArray[np.float64]) -> bool:
+    """True where a shaft turns on, and its speed changes by `LEAST_CHANGE` or less."""
+    return bool(np.all(np.diff(angle) > 0.0)) and speed_change(angle) <= LEAST_CHANGE
+
+
+@contextmanager
+def refusals() -> Iterator[None]:
+    """Turn what an order map cannot use into a ConfigError with a remedy."""
+    try:
+        yield
+    except ValueError as error:
+        raise ConfigError(
+            f"no levels over speed: {error}; give a slower course of operating.speed_profile, or "
+            "a longer operating.duration_s"
+        ) from None
+
+
 def read_run_up(machine: Machine, record: Record) -> RunUp | None:
     """Levels over the speed of a record; None where the speed changes by `LEAST_CHANGE` or less.
 
@@ -136,20 +160,14 @@ def read_run_up(machine: Machine, record: Record) -> RunUp | None:
     rate, names = machine.sensing.sampling_rate, machine.sensing.channel_names
     channel = shown_channel(names)
     shaft, ratio = _shaft(machine, channel)
-    speed = record.signals["shaft_speed"].astype(np.float64) / ratio
-    angle = np.cumsum(speed) / rate
+    angle = shaft_angle(machine, record) / ratio
     signal = record.signals["acceleration"][names.index(channel)].astype(np.float64)
-    try:
-        if speed.min() > 0.0 and speed_change(angle) <= LEAST_CHANGE:
-            return None
+    if is_steady(angle):
+        return None
+    with refusals():
         orders = order_map(signal, angle, rate)
         frame = _frame_time(orders)
         waterfall = frequency_map(signal, angle, rate, frame=frame)
-    except ValueError as error:
-        raise ConfigError(
-            f"no levels over speed: {error}; give a slower course of operating.speed_profile, or "
-            "a longer operating.duration_s"
-        ) from None
     usable = PASS_SHARE * rate
     modes = [mode for mode in _modes(machine) if mode.frequency < usable]
     if _is_torsion(machine, channel):

@@ -55,6 +55,14 @@ def simulate(arguments: Namespace) -> int:
             "--record and --twin are of a data set; give it with --from DIR"
         )
     config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
+    return _show(config, configured_record(config), arguments)
+
+
+def configured_record(config: Configuration) -> Record:
+    """The record of a configuration, every value as configured rather than drawn.
+
+    It has the traces of `with_traces`.
+    """
     name = config["fault"]["kind"]
     config = config.with_keys(
         "plan",
@@ -73,8 +81,7 @@ def simulate(arguments: Namespace) -> int:
     config = config.with_entries(
         classes={name: without_vary(config["fault"])}, life={"kind": NO_LIFE}
     )
-    record = simulate_record(with_traces(config), make_plan(config).record(0))
-    return _show(config, record, arguments)
+    return simulate_record(with_traces(config), make_plan(config).record(0))
 
 
 def _simulate_recorded(arguments: Namespace) -> int:

@@ -1,5 +1,7 @@
 """Run-ups by ``gensig simulate``: figure, table of orders, refusals."""
 
+import json
+
 import h5py
 import numpy as np
 import pytest
@@ -93,3 +95,43 @@ def test_orders_of_no_run_up_are_refused_in_one_line(
     assert words in message
     assert message.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+VARIANTS = "run-up operating=ramp operating.duration_s=1 sensing.channels=[pinion_y]"
+
+
+def test_a_variant_that_is_the_same_machine_changes_nothing(gensig, drawn, tmp_path):
+    """Its twin, a missing tooth, is louder at every speed."""
+    printed = gensig(
+        f"{VARIANTS} --against seed=0 fault=missing_tooth --json v.json --plot v.png"
+    ).out
+    assert "seed=0: +0.00 dB on average" in printed
+    content = json.loads((tmp_path / "v.json").read_text())
+    assert np.all(np.diff(content["speeds_rpm"]) > 0.0)
+    same, louder = (
+        np.array(content["total_change_db"][name], dtype=float)
+        for name in ("seed=0", "fault=missing_tooth")
+    )
+    assert np.all(same == 0.0)
+    assert np.nanmin(louder) > 1.0
+    levels = content["mesh_level_db"]["as configured"]
+    rms = np.array(content["mesh_rms_m_per_s2"]["as configured"])
+    np.testing.assert_allclose(levels, 20.0 * np.log10(rms / 1e-6))
+    assert len(drawn[0]) == 4
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("run-up operating.duration_s=0.2", "changes by 5 % or less"),
+        ("run-up operating=ramp operating.duration_s=0.2", "orders over speed need 8"),
+        (
+            "run-up operating=ramp operating.duration_s=1 "
+            "sensing.channels=[pinion_rotation]",
+            "accelerations in m/s2",
+        ),
+    ],
+)
+def test_variants_without_levels_over_speed_are_refused(line, words, capsys):
+    assert main(line.split()) == 2
+    assert words in capsys.readouterr().err
