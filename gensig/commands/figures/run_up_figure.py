@@ -12,9 +12,13 @@ from gensig.commands.figures.style import (
     COLORS,
     FREQUENCY,
     GREY,
+    MODE,
     SMALL,
+    TOGETHER,
     curve,
     empty_figure,
+    label_above,
+    mark_modes,
     save,
     titles,
 )
@@ -22,8 +26,6 @@ from gensig.commands.gears.run_up import RPM, Mode, RunUp
 from gensig.signals.run_up.level_map import LevelMap
 
 RANGE = 60.0  # dB, of the colors
-MODE = "#56B4E9"
-TOGETHER = 0.035  # of an axis, within which marks share a label
 MOST_LISTED = 11  # natural frequencies
 MOST_CURVES = 12  # natural frequencies drawn across the order map
 MOST_CROSSINGS = 20  # marked below the cuts
@@ -61,7 +63,7 @@ def _order_map(figure: Any, axes: Any, run_up: RunUp) -> None:
     abscissa = f"order of the {run_up.shaft}"
     titles(axes, title, abscissa, _speed(run_up), xlim=(0.0, highest))
     places = {f"{order:.4g}": order for order in run_up.cuts.values()}
-    _top_labels(axes, places, highest)
+    label_above(axes, places, highest)
 
 
 def _waterfall(figure: Any, axes: Any, run_up: RunUp) -> None:
@@ -72,11 +74,10 @@ def _waterfall(figure: Any, axes: Any, run_up: RunUp) -> None:
         hz = order * rpm / 60.0
         shown = hz <= highest
         curve(axes, hz[shown], rpm[shown], "white", style=":", width=0.8)
-    for mode in run_up.modes:
-        axes.axvline(mode.frequency, color=MODE, linestyle="--", linewidth=1.0)
     title = "Waterfall (dashed: natural frequencies, dotted: orders)"
     titles(axes, title, FREQUENCY, _speed(run_up), xlim=(0.0, highest))
-    _top_labels(axes, {mode.name: mode.frequency for mode in run_up.modes}, highest)
+    modes = {mode.name: mode.frequency for mode in run_up.modes}
+    mark_modes(axes, modes, highest)
 
 
 def _cuts(axes: Any, run_up: RunUp) -> None:
@@ -173,24 +174,6 @@ def _levels(figure: Any, axes: Any, run_up: RunUp, levels: LevelMap) -> None:
         vmax=top,
     )
     figure.colorbar(image, ax=axes, label=_decibel(run_up))
-
-
-def _top_labels(axes: Any, places: Mapping[str, float], highest: float) -> None:
-    """Label places of the abscissa above the axes; near ones share a label."""
-    groups: list[list[str]] = []
-    last = -np.inf
-    for name, place in sorted(places.items(), key=lambda item: item[1]):
-        if place > highest:
-            continue
-        if place - last < TOGETHER * highest:
-            groups[-1].append(name)
-        else:
-            groups.append([name])
-        last = place
-    middles = [np.mean([places[name] for name in group]) for group in groups]
-    ends = [dict.fromkeys((group[0], group[-1])) for group in groups]
-    top = axes.secondary_xaxis("top")
-    top.set_xticks(middles, [" to\n".join(names) for names in ends], fontsize=SMALL)
 
 
 def _key(axes: Any, cuts: Any, modes: tuple[Mode, ...]) -> None:
