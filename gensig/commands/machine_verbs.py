@@ -194,7 +194,10 @@ MACHINE_VERBS = {
                 nargs="+",
                 default=[],
             ),
-            json_file("write RMS over the speed, of all orders and of the mesh"),
+            json_file(
+                "write speeds_rpm, and by variant rms_m_per_s2, level_db, change_db: total_ of "
+                "all orders, mesh_ of the mesh and its harmonics"
+            ),
             PLOT,
         ),
         status_1="a record did not stay finite, or its solver gave up; nothing is written",

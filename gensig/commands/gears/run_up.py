@@ -36,9 +36,8 @@ ACCELERATION_REFERENCE = 1e-6  # m/s2, ISO 1683
 HARMONICS = 3  # of the followed mesh
 MOST_CUTS = 5
 MARGIN = 1.1  # of the highest order and frequency in the figure
-MOST_DAMPING = (
-    0.5  # of a mode; above it a resonance, 1 / (2 damping), magnifies nothing
-)
+# Of a mode. Above it a resonance, 1 / (2 damping), magnifies nothing.
+MOST_DAMPING = 0.5
 LEAST_STANDING = 10.0  # dB of a peak over the median of the orders around it; assumed
 REACH = 4.0  # orders on either side of it
 RPM = from_si("speed_rpm", 1.0)
@@ -172,13 +171,13 @@ def read_run_up(machine: Machine, record: Record) -> RunUp | None:
     modes = [mode for mode in _modes(machine) if mode.frequency < usable]
     if _is_torsion(machine, channel):
         cuts, highest = _torsion_cuts(machine, orders)
-        tops = []
+        tops = [0.0]
     else:
         cuts = _mesh_cuts(machine)
         highest = MARGIN * max(cuts.values())
-        tops = [MARGIN * mode.frequency for mode in modes]
+        tops = [0.0, *(MARGIN * mode.frequency for mode in modes)]
     fastest = float(orders.speed.max()) / (2.0 * math.pi)
-    band = min(max(highest * fastest, *tops, 0.0), usable)
+    band = min(max(highest * fastest, *tops), usable)
     return RunUp(
         channel=channel,
         shaft=shaft,

@@ -77,19 +77,28 @@ class LevelMap:
         edges = np.linspace(low, high, n_steps + 1)
         step = np.clip(np.searchsorted(edges, self.speed, "right") - 1, 0, n_steps - 1)
         member = (step == np.arange(n_steps)[:, None]).astype(float)  # (step, frame)
-        count = member.sum(axis=1)
-        with np.errstate(invalid="ignore"):
-            share = member / np.where(count > 0.0, count, np.nan)[:, None]
-            power = share @ np.square(self.rms)
-            total = np.square(self.total) @ share.T
+        total = _mean(member, np.square(self.total)[..., None])[..., 0]
         return LevelMap(
-            time=share @ self.time,
+            time=_mean(member, self.time[:, None])[:, 0],
             speed=0.5 * (edges[1:] + edges[:-1]),
             axis=self.axis,
-            rms=np.sqrt(power),
+            rms=np.sqrt(_mean(member, np.square(self.rms))),
             total=np.sqrt(total),
             resolution=self.resolution,
         )
+
+
+def _mean(member: FloatArray, values: FloatArray) -> FloatArray:
+    """Means of values (..., frame, bin) over the frames of each step, (..., step, bin).
+
+    ``member`` (step, frame) is 1 for the frames of a step. NaN values are left out; a step without
+    others is NaN.
+    """
+    known = np.isfinite(values)
+    count = member @ known.astype(float)
+    mean = np.full(count.shape, np.nan)
+    whole = member @ np.where(known, values, 0.0)
+    return np.divide(whole, count, out=mean, where=count > 0.0)
 
 
 def decibels(rms: ArrayLike, reference: float) -> FloatArray:

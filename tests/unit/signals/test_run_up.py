@@ -106,6 +106,14 @@ def test_orders_beyond_the_usable_frequency_are_unknown():
     assert np.all(np.isnan(result.rms[-1, result.axis > 0.4 * RATE / LOW]))
 
 
+def test_an_order_that_is_unknown_at_high_speeds_stays_known_at_low_ones():
+    result = order_map(np.sin(ANGLE), ANGLE, RATE)
+    middle = 0.39 * RATE / (0.5 * (LOW + HIGH))  # usable up to the middle of the speeds
+    by_speed = result.by_speed().at(middle)
+    assert np.all(np.isfinite(by_speed[: len(by_speed) // 3]))
+    assert np.all(np.isnan(by_speed[-(len(by_speed) // 3) :]))
+
+
 def test_channels_go_through_together():
     rows = np.stack([np.sin(5.0 * ANGLE), np.sin(7.0 * ANGLE)])
     both = order_map(rows, ANGLE, RATE)
