@@ -160,6 +160,7 @@ MACHINE_VERBS = {
         examples=(
             "gensig simulate fault=missing_tooth operating.speed_rpm=1500"
             " --plot missing.png --output missing.csv",
+            "gensig simulate operating=ramp --plot run_up.png --orders run_up.csv",
             "gensig simulate --from runs/quickstart --record 7 --twin --output twin.h5",
         ),
         runs="gensig.commands.gears.simulate:simulate",
@@ -182,11 +183,43 @@ MACHINE_VERBS = {
             text(
                 "--plot",
                 "FILE",
-                "write a figure: signal, spectrum, envelope spectrum",
+                "write a figure: signal, spectrum, envelope spectrum; of a run-up: order map, "
+                "waterfall with natural frequencies, order cuts",
+            ),
+            text(
+                "--orders",
+                "FILE",
+                "of a run-up: write the RMS of every order over the speed (.csv)",
             ),
         ),
         status_1="the record did not stay finite, or its solver gave up; nothing is written",
         instead={"plan": "", "executor": "", "life": "", "out": "--output"},
+    ),
+    "run-up": Verb(
+        summary="vibration over the speed of a run-up, of variants of a machine side by side",
+        examples=(
+            "gensig run-up system=helical_pair operating=ramp operating.speed_rpm=5000"
+            " --against modification=beihang_least_ripple modification=beihang_even_load"
+            " modification=beihang_both --plot modified.png",
+        ),
+        runs="gensig.commands.gears.run_up_variants:run_up",
+        arguments=(
+            *CONFIGURATION,
+            text(
+                "--against",
+                "OVERRIDE",
+                "of one more variant each, added to the others",
+                nargs="+",
+                default=[],
+            ),
+            json_file(
+                "write speeds_rpm, and by variant rms_m_per_s2, level_db, change_db: total_ of "
+                "all orders, mesh_ of the mesh and its harmonics"
+            ),
+            PLOT,
+        ),
+        status_1="a record did not stay finite, or its solver gave up; nothing is written",
+        instead={"plan": "", "executor": "", "life": "", **FILES_INSTEAD},
     ),
     "stiffness": Verb(
         summary="mesh stiffness of sound and faulty teeth",

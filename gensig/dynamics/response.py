@@ -24,6 +24,8 @@ GEAR_AXES = ("x", "y", "rotation")
 # From x to y is +1. The pinion turns the other way: its friction moment is -rho F_f for a force
 # +F_f along its x.
 SENSE = {"pinion": -1.0, "wheel": 1.0}
+# Of the greatest eigenvalue. Below it is rounding of motion that does not oscillate.
+LEAST_SWING = 1e-7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,6 +101,31 @@ def accelerations(dynamics: PairDynamics, frequency: Array, force: Complex) -> C
     dynamic = stiffness - w**2 * np.diag(system.mass) + 1j * w * damping
     displacement = np.linalg.solve(dynamic, force[:, :, None])[:, :, 0]
     return np.asarray(-(w[:, :, 0] ** 2) * displacement)
+
+
+def natural_frequencies(dynamics: PairDynamics) -> tuple[Array, Array]:
+    """Natural frequencies of a pair with its mesh held at its mean stiffness and damping.
+
+    Returns
+    -------
+    frequency : (mode,) Hz    abs(lambda) / (2 pi) of the motions that oscillate, lowest first
+    damping_ratio : (mode,)    -Re(lambda) / abs(lambda), below 1
+
+    Source: eigenvalues lambda of M q'' + C q' + K q = 0, K and C as in ``accelerations``.
+    """
+    from scipy.linalg import eigvals
+
+    system, direction = dynamics.system(), dynamics.approach_direction()
+    mesh = np.outer(direction, direction)
+    mass = np.asarray(system.mass)[:, None]
+    stiffness = (system.stiffness + dynamics.mean_mesh_stiffness * mesh) / mass
+    damping = (system.damping + dynamics.mesh_damping * mesh) / mass
+    unit, zero = np.eye(len(direction)), np.zeros_like(mesh)
+    roots = eigvals(np.block([[zero, unit], [-stiffness, -damping]]))
+    swing = roots[roots.imag > LEAST_SWING * np.abs(roots).max()]
+    swing = swing[np.argsort(np.abs(swing), kind="stable")]
+    rate = np.abs(swing)
+    return rate / (2.0 * np.pi), -swing.real / rate
 
 
 @final

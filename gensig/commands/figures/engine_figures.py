@@ -9,6 +9,7 @@ import numpy as np
 
 from gensig.commands.figures.motor_figures import (
     motor_rows,
+    natural_hz,
     node_name,
     turner,
     turns_evenly,
@@ -21,8 +22,10 @@ from gensig.commands.figures.style import (
     GREY,
     SMALL,
     SOUND,
+    WITH_MODES,
     curve,
     cycle_ticks,
+    mark_modes,
     mark_orders,
     panels,
     save,
@@ -156,8 +159,9 @@ def _waterfalls(
     runs = zip(axes, result.nodes, result.run, strict=False)
     for panel, node, run in runs:
         _waterfall(figure, panel, run)
+        mark_modes(panel, natural_hz(line), WATERFALL_HZ)
         title = f"Run of speeds, {node_name(line, node)}"
-        titles(panel, title, FREQUENCY, f"speed of the {turner(line)}, r/min")
+        titles(panel, title, WITH_MODES, f"speed of the {turner(line)}, r/min")
     for panel in axes[len(result.run) :]:
         panel.set_axis_off()
 

@@ -140,6 +140,18 @@ def _terms(axes: Any, curves: StiffnessCurves) -> None:
     axes.legend(fontsize="x-small", ncols=3, loc="lower right")
 
 
+def shown_channel(names: Sequence[str]) -> str:
+    """Channel that figures of a record show: ``pinion_y`` where there is one, else the first."""
+    if "pinion_y" in names:
+        return "pinion_y"
+    return names[0]
+
+
+def record_name(values: Mapping[str, Any], name: str | None) -> str:
+    """The given name of a record, or its class and severity."""
+    return name or f"{values['label_name']}, severity {values['severity']:.2f}"
+
+
 def plot_record(
     system: Machine,
     acceleration: NDArray[np.float32],
@@ -153,9 +165,7 @@ def plot_record(
     ``name`` is that of the record in the title; None takes its class and severity.
     """
     names = system.sensing.channel_names
-    channel = names[0]
-    if "pinion_y" in names:
-        channel = "pinion_y"
+    channel = shown_channel(names)
     signal = acceleration[names.index(channel)].astype(np.float64)
     rate = system.sensing.sampling_rate
     unit = channel_unit(channel).replace("^2", "$^2$")
@@ -173,10 +183,8 @@ def plot_record(
     _envelope(envelope, signal, rate, shaft)
     for panel in (spectrum, envelope):
         panel.set_ylabel(f"amplitude, {unit}")
-    title = name or f"{values['label_name']}, severity {values['severity']:.2f}"
-    figure.suptitle(
-        f"{title}: {values['speed_rpm']:.1f} r/min, {values['torque_nm']:.3g} N m"
-    )
+    point = f"{values['speed_rpm']:.1f} r/min, {values['torque_nm']:.3g} N m"
+    figure.suptitle(f"{record_name(values, name)}: {point}")
     save(figure, path)
 
 

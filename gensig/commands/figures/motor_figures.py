@@ -19,6 +19,12 @@ def turner(line: EngineLine) -> str:
     return "motor"
 
 
+def natural_hz(line: EngineLine) -> dict[str, float]:
+    """Natural frequencies of a line, Hz, by their rounded values."""
+    frequencies = line.drive.modes().frequency
+    return {f"{hz:.0f}": float(hz) for hz in frequencies if hz > 0.0}
+
+
 def turns_evenly(line: EngineLine) -> bool:
     """True when nothing excites the line while its meshes never part."""
     return not isinstance(line.engine, Engine) and line.engine.ripple is None

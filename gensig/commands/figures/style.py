@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 # Colors that color-blind readers can tell apart.
 SOUND, FAULTY, THIRD, FOURTH = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 GREY = "#777777"
 COLORS = (SOUND, FAULTY, THIRD, FOURTH, "#56B4E9", GREY)
+MODE = COLORS[4]  # natural frequencies
+TOGETHER = 0.035  # of an axis, within which marks share a label
 DPI = 130
 SMALL = 8  # points, of legends in dense figures
 
@@ -20,6 +23,7 @@ MESH_PERIODS = "mesh periods"
 FIRST_SLICE = "position of the first slice, base pitches"
 STIFFNESS = "stiffness, 10$^9$ N/m"
 FREQUENCY = "frequency, Hz"
+WITH_MODES = "frequency, Hz (dashed: natural frequencies)"
 ANGLE_AMPLITUDE = "amplitude, degrees"
 
 
@@ -113,3 +117,29 @@ def mark_orders(
                 ha="center",
                 va="top",
             )
+
+
+def mark_modes(axes: Any, modes: Mapping[str, float], highest: float) -> None:
+    """Draw natural frequencies, Hz by name, up to one across a waterfall, and name them above."""
+    for frequency in modes.values():
+        if frequency < highest:
+            axes.axvline(frequency, color=MODE, linestyle="--", linewidth=1.0)
+    label_above(axes, modes, highest)
+
+
+def label_above(axes: Any, places: Mapping[str, float], highest: float) -> None:
+    """Label places of the abscissa above the axes; near ones share a label."""
+    groups: list[list[str]] = []
+    last = -np.inf
+    for name, place in sorted(places.items(), key=lambda item: item[1]):
+        if place > highest:
+            continue
+        if place - last < TOGETHER * highest:
+            groups[-1].append(name)
+        else:
+            groups.append([name])
+        last = place
+    middles = [np.mean([places[name] for name in group]) for group in groups]
+    ends = [dict.fromkeys((group[0], group[-1])) for group in groups]
+    top = axes.secondary_xaxis("top")
+    top.set_xticks(middles, [" to\n".join(names) for names in ends], fontsize=SMALL)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gensig.commands.figures.motor_figures import node_name, turner
+from gensig.commands.figures.motor_figures import natural_hz, node_name, turner
 from gensig.commands.figures.style import (
     ANGLE_AMPLITUDE,
     COLORS,
@@ -15,8 +15,10 @@ from gensig.commands.figures.style import (
     GREY,
     SMALL,
     SOUND,
+    WITH_MODES,
     band,
     curve,
+    mark_modes,
     mark_orders,
     titles,
     waterfall,
@@ -100,7 +102,9 @@ def sweep_rows(
         top = float(max(way.spectra[column].max() for way in ways.values()))
         for panel, (word, way) in zip(axes[:2, column], ways.items(), strict=True):
             _waterfall(figure, panel, way, column, top)
-            titles(panel, f"In time, {word}, {name}", FREQUENCY, speed)
+            mark_modes(panel, natural_hz(line), way.frequencies[-1])
+            title = f"In time, {word}, {name}"
+            titles(panel, title, WITH_MODES, speed)
         _both_ways(axes[2, column], result, sweep, column)
         title = f"Speed fluctuation in a cycle, {name}"
         titles(axes[2, column], title, speed, "plus or minus, r/min")

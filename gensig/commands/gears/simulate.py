@@ -8,7 +8,16 @@ from pathlib import Path
 import numpy as np
 
 from gensig.commands.console import remark, replaced_file
-from gensig.commands.figures.machine_figures import plot_record
+from gensig.commands.figures.machine_figures import plot_record, record_name
+from gensig.commands.figures.run_up_figure import plot_run_up
+from gensig.commands.gears.run_up import (
+    RunUp,
+    print_run_up,
+    read_run_up,
+    with_traces,
+    without_traces,
+    write_levels,
+)
 from gensig.commands.output import FIGURE_TYPES, check_file, check_new
 from gensig.errors import ConfigError
 from gensig.faults.registry import without_vary
@@ -22,10 +31,12 @@ from gensig.record.machines import read_machine
 from gensig.record.options import AS_GIVEN, CROSSED
 from gensig.record.simulate import Record, simulate_record
 from gensig.signals.indicators import crest_factor, kurtosis, rms
+from gensig.signals.run_up.speed_maps import LEAST_CHANGE
 from gensig.systems.base import Machine
 from gensig.units import channel_unit
 
 RECORD_TYPES = (".h5", ".hdf5", ".csv")
+TABLE_TYPES = (".csv",)
 
 
 def simulate(arguments: Namespace) -> int:
@@ -35,6 +46,7 @@ def simulate(arguments: Namespace) -> int:
     """
     check_file("--plot", arguments.plot, FIGURE_TYPES)
     check_file("--output", arguments.output, RECORD_TYPES)
+    check_file("--orders", arguments.orders, TABLE_TYPES)
     check_new("--output", arguments.output, force=arguments.force)
     if arguments.folder is not None:
         return _simulate_recorded(arguments)
@@ -43,6 +55,14 @@ def simulate(arguments: Namespace) -> int:
             "--record and --twin are of a data set; give it with --from DIR"
         )
     config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
+    return _show(config, configured_record(config), arguments)
+
+
+def configured_record(config: Configuration) -> Record:
+    """The record of a configuration, every value as configured rather than drawn.
+
+    It has the traces of `with_traces`.
+    """
     name = config["fault"]["kind"]
     config = config.with_keys(
         "plan",
@@ -61,8 +81,7 @@ def simulate(arguments: Namespace) -> int:
     config = config.with_entries(
         classes={name: without_vary(config["fault"])}, life={"kind": NO_LIFE}
     )
-    record = simulate_record(config, make_plan(config).record(0))
-    return _show(config, record, arguments)
+    return simulate_record(with_traces(config), make_plan(config).record(0))
 
 
 def _simulate_recorded(arguments: Namespace) -> int:
@@ -76,34 +95,69 @@ def _simulate_recorded(arguments: Namespace) -> int:
         raise ConfigError("--from needs --record I, the number or id of a record")
     config, row = recorded_row(Path(arguments.folder), arguments.record)
     if not arguments.twin:
-        return _show(config, simulate_record(config, row), arguments)
+        return _show(config, simulate_record(with_traces(config), row), arguments)
     name = f"healthy twin of {row['record_id']} ({row['label_name']})"
-    return _show(config, simulate_twin(config, row), arguments, name)
+    return _show(config, simulate_twin(with_traces(config), row), arguments, name)
 
 
 def _show(
     config: Configuration, record: Record, arguments: Namespace, name: str | None = None
 ) -> int:
-    """Write, draw and print one record; a record without a name has its class and severity."""
+    """Write, draw and print one record of `with_traces`.
+
+    A record without a name has its class and severity.
+    """
     values, acceleration = record.values, record.signals.get("acceleration")
     if values.get("status") == "failed" or acceleration is None:
         remark(f"{values['status_reason']}")
         return 1
     system = read_machine(config)
+    run_up = _run_up(system, record, arguments)
     if arguments.output:
         with replaced_file(arguments.output) as path:
             if path.suffix == ".csv":
                 _write_csv(system, acceleration, path)
             else:
-                _write_shard(config, record, path)
+                _write_shard(config, without_traces(config, record), path)
     if arguments.plot:
         with replaced_file(arguments.plot) as path:
-            plot_record(system, acceleration, values, path, name=name)
+            if run_up is None:
+                plot_record(system, acceleration, values, path, name=name)
+            else:
+                plot_run_up(run_up, path, name=record_name(values, name))
+    if arguments.orders and run_up is not None:
+        with replaced_file(arguments.orders) as path:
+            write_levels(run_up, path)
     print(name or f"class {values['label_name']}, severity {values['severity']:.3f}")
     speed, mesh = values["speed_rpm"], values["mesh_frequency_hz"]
     print(f"speed {speed:.3f} r/min, mesh frequency {mesh:.2f} Hz")
     _print_levels(system, acceleration)
+    if run_up is not None:
+        print_run_up(run_up)
     return 0
+
+
+def _run_up(system: Machine, record: Record, arguments: Namespace) -> RunUp | None:
+    """Levels over the speed of a record where a figure or a table asks for them.
+
+    None where the speed hardly changes. ``--orders`` needs them; a figure without them is that of
+    a constant speed.
+    """
+    if not (arguments.plot or arguments.orders):
+        return None
+    try:
+        run_up = read_run_up(system, record)
+    except ConfigError as error:
+        if arguments.orders:
+            raise
+        remark(f"{error}; the figure is that of a constant speed")
+        return None
+    if arguments.orders and run_up is None:
+        raise ConfigError(
+            f"--orders {arguments.orders}: the speed changes by {100.0 * LEAST_CHANGE:g} % or "
+            "less; give a course in operating.speed_profile, for instance operating=ramp"
+        )
+    return run_up
 
 
 def _write_shard(config: Configuration, record: Record, path: Path) -> None:

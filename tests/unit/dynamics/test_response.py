@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from closeness import assert_close
 
-from gensig.dynamics.pair import PINION_X, Rotor
-from gensig.dynamics.response import accelerations
+from gensig.dynamics.pair import PINION_ROTATION, PINION_X, Rotor
+from gensig.dynamics.response import accelerations, natural_frequencies
 
 ROTORS = {
     "motor": Rotor(
@@ -63,3 +63,18 @@ def test_it_solves_the_equations_of_motion(xiamen, dynamics_of, rotors, name):
     force = system.mass * acceleration + held + direction * (direction @ mesh)
 
     assert_close(force, np.eye(len(force))[dof], atol=1e-9)
+
+
+def test_a_machine_resonates_at_its_natural_frequencies(xiamen, dynamics_of):
+    """Displacement under a force on the pinion, at modes of little damping."""
+    dynamics = dynamics_of(xiamen)
+    frequency, damping = natural_frequencies(dynamics)
+    assert np.all(np.diff(frequency) > 0.0)
+    assert np.all((damping > 0.0) & (damping < 1.0))
+    light = [w for w, ratio in zip(frequency, damping, strict=True) if ratio < 0.2]
+    assert light
+    for natural in light:
+        grid = 2.0 * np.pi * natural * np.linspace(0.8, 1.2, 401)
+        answer = np.abs(responses(dynamics, grid, PINION_ROTATION))[:, PINION_ROTATION]
+        highest = grid[(answer / grid**2).argmax()] / (2.0 * np.pi)
+        assert_close(highest, natural, 0.05)
