@@ -58,7 +58,7 @@ def test_every_quantity_is_used():
         ("table_2_3.9_15_pit.C", "fault.pit_width_mm=9"),
         ("fe_coupled.double_zone.3_of_7", "mesh.pair_coupling=sum"),
         ("corner_gap.missing_tooth.peak", "gear.addendum_coefficient=0.98"),
-        ("record_healthy_lin.RMS", "mesh.law=one_sided"),
+        ("record_healthy_lin.RMS", "mesh.pair_coupling=coupled"),
         ("ours_structure_strain.pinion.C", "mesh.elasticity=plane_stress"),
         ("ours_tooth.pinion.C", "mesh.tooth=to_contact"),
         ("ours_body_bores.pinion_E.5mm", "mesh.body=sainsot"),

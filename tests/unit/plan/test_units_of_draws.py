@@ -10,6 +10,7 @@ from gensig.units import split_unit
 
 # Keys of the configuration that are pure numbers; every other that can be drawn ends in its unit.
 NUMBERS = {
+    "pinion_heat_share",
     "poisson_ratio",
     "damping_ratio",
     "friction_coefficient",
