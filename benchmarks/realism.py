@@ -202,7 +202,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--stored",
         action="store_true",
-        help="store the results and figures for docs/validation.md",
+        help="store the results and figures for docs/howto/realism.md",
     )
     parser.add_argument(
         "--frozen",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 from argparse import Namespace
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +25,21 @@ def validate(arguments: Namespace) -> int:
     verdicts, page = _of_checkout("verdicts"), _of_checkout("markdown")
     results = verdicts.run_validation()
     if arguments.markdown:
-        with replaced_file(arguments.markdown) as path:
-            path.write_text(page.markdown(results), encoding="utf-8")
+        _write_pages(page.markdown(results), Path(arguments.markdown).parent)
     print(*page.shortfalls(results), page.summary(results), sep="\n")
     n_surprises = sum(not result.as_expected for result in results)
     if n_surprises:
         remark(f"{n_surprises} row(s) differ from what they declare")
     return int(n_surprises > 0)
+
+
+def _write_pages(texts: Mapping[str, str], docs: Path) -> None:
+    """Write the index, a page and a CSV for each paper, and the page on realism."""
+    for name, text in texts.items():
+        target = docs / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with replaced_file(target) as path:
+            path.write_text(text, encoding="utf-8")
 
 
 def _of_checkout(module: str) -> Any:

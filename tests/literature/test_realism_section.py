@@ -1,4 +1,4 @@
-"""The section of docs/validation.md on simulated records and measured ranges."""
+"""The results in docs/howto/realism.md: simulated records beside measured ranges."""
 
 from measured_range import measured
 from validation.realism_section import realism_lines

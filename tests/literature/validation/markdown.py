@@ -1,28 +1,32 @@
-"""``docs/validation.md``: every row with its verdict, the points of one line together."""
+"""``docs/validation.md``, a page for each paper, and every row with its verdict as CSV."""
 
 from __future__ import annotations
 
+import csv
+import io
+import textwrap
 from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 
+from validation.pages import PAGES, Page
 from validation.realism_section import realism_lines
 from validation.rows import DIFFERS, FAILS, ROUGH, VERDICTS, Result
 
-SOURCE_TITLES = {
-    "spur_reference": "Reference numbers for the spur pair",
-    "spur_paper": "What the spur paper prints and claims",
-    "helical_reference": "Reference numbers for both helical pairs",
-    "helical_error_paper": "What the paper on transmission error and flank modification prints",
-    "helical_heat_paper": "What the paper on helical stiffness with temperature prints",
-    "engine_root_stress": "Root stress and safety factor of the diesel's injection pump drive",
-    "engine_reference": "Reference numbers for the diesel's shaft line",
-    "engine_paper": "What the paper on the diesel's timing gears prints",
-    "wear_reference": "Reference numbers for the wear life",
-    "wear_paper": "What the wear-life paper prints and claims",
-    "engine_response": "What the same paper prints of the running engine",
-    "engine_dampers": "Tooth load, dampers, spectra and waterfalls of the same engine",
-    "engine_time": "The same engine in time, teeth free to part",
-}
+DOCS = Path(__file__).resolve().parents[3] / "docs"
+RESULTS_MARK = "<!-- generated from here on -->"
+WIDTH = 100
+COLUMNS = (
+    "source",
+    "id",
+    "printed",
+    "computed",
+    "unit",
+    "deviation",
+    "verdict",
+    "where",
+    "reason",
+)
 SOURCE_TEXTS = {
     "spur_reference": (
         "Computed independently of this project (rack geometry, potential-energy method, 2-D "
@@ -118,191 +122,127 @@ SOURCE_TEXTS = {
         "cent with the last bit, so they are given to two digits (`~`), and 15 % is accepted."
     ),
 }
-TITLES = {
-    "geometry": "Teeth and root transition curve",
-    "action": "Line of action",
-    "contact": "Contact",
-    "table_2_1": "Gear body: coefficients of Sainsot's fit",
-    "table_2_2": "Compliances of sound teeth, line by line",
-    "other_root_angle": "Body under other readings of theta_f",
-    "table_2_3": "Stiffness over a mesh cycle, sound and faulty",
-    "faults_of_the_paper": "The paper's crack and pit in numbers",
-    "body_sharing": "Bodies counted twice, once, or shared",
-    "pem_structure": "Tooth and body together",
-    "fe_structure": "Tooth and body against finite elements",
-    "ours_structure_strain": (
-        "Tooth and body against finite elements, gensig's default, plane strain"
-    ),
-    "ours_structure_stress": (
-        "Tooth and body against finite elements, gensig's default, plane stress"
-    ),
-    "fe_tooth": "Tooth alone against finite elements",
-    "fe_body": "Body alone against finite elements",
-    "ours_tooth": "Tooth alone against finite elements, gensig's default, plane stress",
-    "ours_body": "Body alone against finite elements, gensig's default, plane stress",
-    "fe_pair_strain": "Whole pair against finite elements, plane strain",
-    "fe_pair_stress": "Whole pair against finite elements, plane stress",
-    "ours_local": "Local compliance against finite elements, gensig's default",
-    "ours_pair_strain": "Whole pair against finite elements, gensig's default",
-    "fe_cross_compliance": "Body compliance that two pairs share",
-    "pem_sum": "Double zone, plain sum",
-    "fe_coupled": "Double zone with the shared body",
-    "ours_cross": "Body compliance that two pairs share, gensig's default",
-    "ours_pair_structure": (
-        "Double zone, teeth and bodies against finite elements, gensig's default, plane "
-        "stress"
-    ),
-    "ours_double_zone": "Double zone against finite elements, gensig's default",
-    "ours_load_share": "Load share of the entering pair, gensig's default",
-    "ours_best_estimate": "The reference's best estimate of the mesh, gensig's default",
-    "bores": "Dependence on the bores",
-    "ours_bores": (
-        "Dependence on the bores against finite elements, gensig's default, plane stress with "
-        "the Hertz term"
-    ),
-    "ours_body_bores": (
-        "Body over the bores against finite elements, gensig's default, plane stress"
-    ),
-    "sainsot_bores": "Body over the bores, Sainsot's over that of finite elements",
-    "crack_increment": "Crack: what eqs. (11) and (12) add to its tooth",
-    "ours_crack": "Crack against finite elements, gensig's default",
-    "ours_crack_over_papers": "Crack over eqs. (11) and (12), gensig's default",
-    "ours_crack_loss": "Loss of pair stiffness by a crack, gensig's default",
-    "ours_pit": "Pit on slices of the flank, gensig's default",
-    "iso6336": "ISO 6336-1, Method B",
-    "iso6336_beside": "Our stiffness beside ISO 6336-1 and the literature",
-    "modes": "Natural frequencies",
-    "corner_gap": "Contact beyond the ends of the path",
-    "record_healthy_lin": "Record, healthy, paper's law",
-    "record_crackPEM_lin": "Record, 1 mm crack, paper's law",
-    "record_pit_lin": "Record, pit, paper's law",
-    "record_missing_lin": "Record, missing tooth, paper's law",
-    "record_healthy_gap": "Record, healthy, one-sided law",
-    "record_pit_gap": "Record, pit, one-sided law",
-    "record_missing_gap": "Record, missing tooth, one-sided law",
-    "rig": "Rig",
-    "crack": "Crack",
-    "pit": "Pit",
-    "missing": "Missing tooth",
-    "severity": "Severity series",
-    "root_curve": "What the root transition curve buys",
-    "roll_torque": "Torque that keeps the energy balance",
-    "helical_geometry": "Geometry",
-    "slices": "Loaded slices",
-    "schemes_aligned": "The three modifications, aligned",
-    "schemes_misaligned": "The three modifications, 5.2 um misaligned",
-    "printed_geometry": "Geometry and load",
-    "printed_error": "Transmission error and line load",
-    "printed_schemes": "Tables 3 to 5",
-    "run_up_lower": "Run-up to 5000 r/min: modified flanks are quieter on average",
-    "run_up_at_most_4": "... by at most 4 dB",
-    "run_up_good": "... everywhere between 2700 and 3200 r/min",
-    "run_up_best": "... and the combined scheme most between 1500 and 3500 r/min",
-    "cold": "Cold stiffness",
-    "pump_drive": "What the paper prints",
-    "reference": "Form and stress correction factors, forces",
-    "variants": "The same stress under other racks",
-    "mesh": "Through the mesh",
-    "bulk_field": "Bulk temperature above the oil",
-    "hot": "Hot stiffness",
-    "hot_change": "Hot over cold, effect by effect",
-    "finite_elements": "Beside the paper's finite elements",
-    "sweeps": "Sweeps of friction, torque and speed",
-    "sweeps_rise": "Does stiffness rise with friction, torque and speed?",
-    "torque_matters_most": "Does torque matter most?",
-    "heat_flow": "Friction heat, and how warm the cooled surfaces get",
-    "flash": "Flash temperature",
-    "hotter_than_housing": "Gears hotter than their housing",
-    "line_modes": "Natural frequencies of the whole line",
-    "computed_modes": "Natural frequencies, as the paper computed them",
-    "measured_modes": "Natural frequencies, as the paper measured them",
-    "wear_geometry": "Geometry",
-    "wear_sliding": "Sliding",
-    "wear_pressure": "Contact pressure",
-    "wear_per_mesh": "Wear of a mesh",
-    "wear_rate": "Wear of an hour",
-    "wear_exponent": "Exponents of the torque",
-    "wear_step": "Convergence",
-    "wear_life": "Lives that the paper's fits allow",
-    "wear_fits": "Local exponents of the printed fits",
-    "wear_drive": "Contact ratio",
-    "wear_sliding_paper": "Sliding",
-    "wear_pressure_paper": "Contact pressure",
-    "wear_depth_paper": "Wear depth",
-    "wear_step_paper": "The step of the paper's rule",
-    "wear_radius_paper": "Curvature radius after wear",
-    "wear_life_paper": "Lives as printed",
-    "wear_fits_paper": "The printed fits as fits of our law",
-    "fluctuation_computed": "Speed fluctuation, as the paper computed it",
-    "fluctuation_measured": "Speed fluctuation, as the paper measured it",
-    "engine_alone": "Speed fluctuation by the cylinders alone",
-    "ratios": "Pump end against flywheel",
-    "spectrum": "Orders of the largest lines",
-    "root_stress": "Root stress under the dynamic tooth load, ISO's load point",
-    "root_stress_over_mesh": "The same over the mesh, largest of all teeth",
-    "stress_drop": "Root stress less by dampers",
-    "safety_paper": "Safety under the dynamic tooth load, the paper's convention",
-    "safety_iso": "Safety under the dynamic tooth load, ISO 6336-3",
-    "half_orders": "Largest half order over the largest whole order",
-    "disturbance_5_hz": "Disturbance of the dynamometer over order 1",
-    "waterfall": (
-        "Frequency at which an order is largest over the run: 1, 5 and 10 for modes 1, 2 and "
-        "3"
-    ),
-    "tooth_force": "Forces of the pump drive's teeth",
-    "cycle": "The assumed cycle",
-    "fluctuation_in_time": "Speed fluctuation in a cycle",
-    "ratios_in_time": "Pump end against flywheel in time",
-    "half_orders_in_time": "Largest half order over the largest whole order, in time",
-    "spectrum_in_time": "Orders of the largest lines, in time",
-    "tooth_force_in_time": "Forces of the pump drive's teeth in a cycle",
-    "root_stress_in_time": (
-        "Root stress under the greatest tooth force of a cycle, ISO's load point"
-    ),
-    "root_stress_in_time_over_mesh": "The same over the mesh, largest of a cycle",
-    "stress_ratio_in_time": "Root stress with dampers over that without, in time",
-    "safety_in_time": "Safety under the greatest tooth force of a cycle",
-}
-INTRO = (
-    "# Validation\n"
-    "\n"
-    "Every printed figure and claim of the sources against what gensig computes, by "
-    "the same rows that `tests/literature`\n"
-    "checks. Generated by `gensig validate --markdown docs/validation.md`; do not "
-    "edit. The rows, with the configuration\n"
-    "each belongs to, are `tests/literature/validation/*.csv`.\n"
-    "\n"
-    "*Reproduced*: within the row's tolerance, or within half a unit of the last "
-    "printed digit. *Differs*: not so, with the\n"
-    "reason. A claim *holds* when its number meets the criterion in the column "
-    '"printed". *Not printed*: a number shown\n'
-    'beside those that are. No input was tuned to reach a printed number. "Deviation" '
-    "is the largest of a line's points.\n"
-)
+INTRO = """\
+# Validation
+
+Every printed figure and claim of the sources against what gensig computes. Generated by `gensig
+validate --markdown docs/validation.md`, as are the pages below and the CSV beside each, which has
+every row; do not edit. `tests/literature` checks the same rows; the configuration that each belongs
+to is in `tests/literature/validation/*.csv`.
+
+*Reproduced*: within the row's tolerance, or within half a unit of the last printed digit.
+*Differs*: not so, with the reason. A claim *holds* when its number meets the criterion in the
+column "printed". *Not printed*: a number shown beside those that are. No input was tuned to reach a
+printed number. `gensig figures` draws the papers' figures beside the printed numbers.
+"""
+PAGE_INTRO = """\
+Generated; do not edit. How to read it: [validation](../validation.md). All rows:
+[{name}.csv]({name}.csv).
+"""
 
 
-def markdown(results: Sequence[Result]) -> str:
-    """The whole page."""
-    short = [result for result in results if result.verdict in (DIFFERS, FAILS)]
+def markdown(results: Sequence[Result]) -> dict[str, str]:
+    """The text of every page and every CSV, by its path in ``docs``."""
+    texts = {"validation.md": _index(results), "howto/realism.md": _realism()}
+    for name, page in PAGES.items():
+        mine = [result for result in results if result.row.origin in page.sources]
+        texts[f"validation/{name}.md"] = _page(name, page, mine)
+        texts[f"validation/{name}.csv"] = _rows(mine)
+    return texts
+
+
+def _realism() -> str:
+    """The page on realism: what is written by hand, and the results behind its mark."""
+    written = (DOCS / "howto" / "realism.md").read_text(encoding="utf-8")
+    by_hand, mark, _ = written.partition(RESULTS_MARK)
+    return "\n".join([by_hand + mark, *realism_lines()]) + "\n"
+
+
+def _index(results: Sequence[Result]) -> str:
+    papers = [
+        f"- [{page.title}](validation/{name}.md): {page.answer}"
+        for name, page in PAGES.items()
+    ]
     parts = [
         INTRO,
+        "## The papers\n",
+        _wrapped(papers),
+        "\nMeasured gearboxes: [realism](howto/realism.md#results).\n",
         "## Verdicts\n",
         summary(results),
-        "\n## What differs, and what does not hold\n",
-        _table(short),
     ]
-    for source in _sources(results):
-        mine = [result for result in results if result.row.origin == source]
-        parts += [
-            f"\n## {SOURCE_TITLES.get(source, source)}\n",
-            SOURCE_TEXTS.get(source, ""),
-        ]
-        for head in dict.fromkeys(_head(result) for result in mine):
-            parts.append(f"\n### {TITLES.get(head, head)}\n")
-            parts.append(
-                _table([result for result in mine if _head(result) == head], head=head)
-            )
-    return "\n".join([*parts, *realism_lines()]) + "\n"
+    return "\n".join(parts) + "\n"
+
+
+def _page(name: str, page: Page, results: Sequence[Result]) -> str:
+    parts = [f"# {page.title}\n", PAGE_INTRO.format(name=name), _wrapped([page.claims])]
+    if page.picture:
+        parts.append(f"\n![{page.caption}](../figures/papers/{page.picture})\n")
+    parts += ["\n## Headline numbers\n", _table(_headlines(page, results))]
+    parts += ["\n## What differs, and why\n", _wrapped(_reasons(results))]
+    parts += ["\n## How it was computed\n"]
+    parts += [
+        _wrapped([f"- **{name}**: {SOURCE_TEXTS[name]}" for name in page.sources])
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def _headlines(page: Page, results: Sequence[Result]) -> list[Result]:
+    """Rows of the lines that a page shows, in its order."""
+    found = [
+        [result for result in results if _line(result) == line]
+        for line in page.headlines
+    ]
+    empty = [line for line, rows in zip(page.headlines, found, strict=True) if not rows]
+    if empty:
+        raise ValueError(f"no rows of {', '.join(empty)}")
+    return [result for rows in found for result in rows]
+
+
+def _reasons(results: Sequence[Result]) -> list[str]:
+    """Every reason once with the lines that it explains, the one of most rows first."""
+    by_reason: dict[str, list[Result]] = {}
+    for result in results:
+        if result.verdict in (DIFFERS, FAILS):
+            by_reason.setdefault(result.row.reason, []).append(result)
+    ordered = sorted(by_reason.items(), key=lambda item: -len(item[1]))
+    lines = []
+    for reason, rows in ordered:
+        named = ", ".join(f"*{line}*" for line in dict.fromkeys(map(_line, rows)))
+        lines.append(f"- {named}: {reason}")
+    return lines
+
+
+def _line(result: Result) -> str:
+    return result.row.id.rpartition(".")[0]
+
+
+def _wrapped(paragraphs: Sequence[str]) -> str:
+    return "\n".join(
+        textwrap.fill(
+            text,
+            WIDTH,
+            subsequent_indent="  " if text.startswith("- ") else "",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        for text in paragraphs
+    )
+
+
+def _rows(results: Sequence[Result]) -> str:
+    """All rows as CSV."""
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for result in results:
+        row, deviations = result.row, []
+        if result.deviation is not None:
+            deviations.append(result.deviation)
+        deviation = _largest(deviations, rough=row.origin in ROUGH)
+        place = row.origin, row.id, row.printed, _computed(result), row.unit
+        writer.writerow([*place, deviation, result.verdict, row.source, row.reason])
+    return file.getvalue()
 
 
 def summary(results: Sequence[Result]) -> str:
@@ -358,46 +298,34 @@ def _sources(results: Sequence[Result]) -> list[str]:
     return list(dict.fromkeys(result.row.origin for result in results))
 
 
-def _head(result: Result) -> str:
-    return result.row.id.partition(".")[0]
-
-
-def _table(results: Sequence[Result], *, head: str = "") -> str:
+def _table(results: Sequence[Result]) -> str:
     """One line for each group of rows whose id differs in its last part only and that have the
     same verdict.
     """
     groups: dict[tuple[str, ...], list[Result]] = {}
     for result in results:
-        row = result.row
-        groups.setdefault(
-            (row.id.rpartition(".")[0], row.unit, result.verdict, row.reason), []
-        ).append(result)
+        key = _line(result), result.row.unit, result.verdict
+        groups.setdefault(key, []).append(result)
     lines = [
-        "| id | at | printed | computed | unit | deviation | verdict | source | reason |",
-        "|---" * 9 + "|",
+        "| line | at | printed | computed | unit | deviation | verdict |",
+        "|---" * 7 + "|",
     ]
-    for (line, unit, verdict, reason), members in groups.items():
+    for (line, unit, verdict), members in groups.items():
         rows = [result.row for result in members]
         printed = [row.printed for row in rows]
         if rows[0].kind == "claim":
             printed = list(dict.fromkeys(printed))
+        deviations = [
+            result.deviation for result in members if result.deviation is not None
+        ]
         cells = [
-            line.removeprefix(f"{head}."),
+            line,
             " ".join(row.id.rpartition(".")[2] for row in rows),
             " ".join(printed),
             " ".join(_computed(result) for result in members),
             unit,
-            _largest(
-                [
-                    result.deviation
-                    for result in members
-                    if result.deviation is not None
-                ],
-                rough=rows[0].origin in ROUGH,
-            ),
+            _largest(deviations, rough=rows[0].origin in ROUGH),
             verdict,
-            "; ".join(dict.fromkeys(row.source for row in rows)),
-            reason,
         ]
         lines.append("| " + " | ".join(cell.strip() for cell in cells) + " |")
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""The section of docs/validation.md on simulated records and measured ranges."""
+"""The results in docs/howto/realism.md: simulated records beside measured ranges."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def realism_lines(path: Path = RESULTS) -> list[str]:
     heading, rows = read_results(path)
     lines = [
         "",
-        "## Realism: beside measurements",
+        "## Results",
         "",
         TEXT,
         "",
@@ -65,5 +65,5 @@ def _part(title: str, text: str, figure: str, rows: Sequence[Comparison]) -> lis
     """One table of the section with its figure."""
     if not rows:
         return []
-    picture = f"![{title}: simulated beside measured](figures/realism_{figure}.png)"
+    picture = f"![{title}: simulated beside measured](../figures/realism_{figure}.png)"
     return ["", f"### {title}", "", text, "", picture, "", *table(rows)]
