@@ -75,7 +75,7 @@ GENSIG = {
     "mesh": "errors geometry material options units",
     "operation": "errors options text units",
     "options": "errors text units",
-    "papers": "dynamics faults life operation options sensing signals systems units",
+    "papers": "driveline dynamics faults life operation options sensing signals systems units",
     "plan": (
         "dataset errors faults geometry life mesh operation options record systems "
         "units"

@@ -117,7 +117,7 @@ MACHINE_VERBS = {
         ),
         runs="gensig.commands.paper_figures:figures",
         arguments=(
-            text("paper", "PAPER", "spur, helical_heat, helical_error or wear"),
+            text("paper", "PAPER", "spur, helical_heat, helical_error, engine or wear"),
             text(
                 "numbers",
                 "FIGURE",

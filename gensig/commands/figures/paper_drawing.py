@@ -9,7 +9,7 @@ from typing import Any
 from gensig.commands.figures.style import COLORS, curve, panels, save, titles
 from gensig.papers.paper_figure import Panel, PaperFigure
 
-PANEL_WIDTH, HEIGHT = 6.0, 4.6  # inches
+PANEL_WIDTH, HEIGHT = 6.0, 5.2  # inches
 LETTERS_PER_INCH = 14
 FEW_POINTS = 8  # that are marked one by one
 
@@ -36,4 +36,5 @@ def _panel(axes: Any, panel: Panel) -> None:
             style += "o"
         curve(axes, each.x, each.y, color, each.label, style=style, width=1.2)
     titles(axes, panel.title, panel.x_label, panel.y_label)
-    axes.legend(fontsize="small")
+    below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.14), "ncols": 2}
+    axes.legend(fontsize="small", frameon=False, **below)

@@ -126,6 +126,8 @@ PAGES = {
             "root_stress_in_time.sprung_dampers",
             "ratios_in_time.energy_peak_pump_gear",
         ),
+        picture="engine_11.png",
+        caption="Speed of the pump gear over two cycles, for two firing orders",
     ),
     "wear": Page(
         title="Wear life",

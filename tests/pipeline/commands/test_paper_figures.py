@@ -79,6 +79,19 @@ def test_lives_fall_with_the_speed_and_the_root_of_the_torque(written):
         assert abs(slope - power) < 0.01
 
 
+def test_the_pump_gear_fluctuates_as_printed(written):
+    """On its supports, within a fifth of the printed 120 r/min, for both firing orders."""
+    curves, printed = points(written("engine"), "engine_11")
+    assert len(printed) == 4
+    assert curves["pump gear", "printed, computed, highest"][1, 0] == 120.0
+    for order in ("least couples", "in sequence"):
+        cycles, speed = curves["pump gear", order]
+        halves = [
+            0.5 * np.ptp(speed[(cycles >= k) & (cycles < k + 1)]) for k in range(2)
+        ]
+        assert 0.75 < np.mean(halves) / 120.0 < 1.4
+
+
 def test_a_missing_tooth_is_an_impact_a_turn_by_the_papers_equations(written):
     curves, _ = points(written("spur"), "spur_14")
     highest = {

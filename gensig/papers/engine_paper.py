@@ -1,0 +1,118 @@
+"""Figures of the paper on the timing gears of a marine diesel."""
+
+from __future__ import annotations
+
+import math
+from functools import cache, partial
+
+import numpy as np
+
+from gensig.driveline.engine_line import read_engine_line
+from gensig.driveline.excitation.cycle_statistics import (
+    fluctuations,
+    order_amplitudes,
+)
+from gensig.driveline.in_time import TimeResponse, tabulated_meshes, time_response
+from gensig.options.compose import compose
+from gensig.papers.paper_figure import Array, Curve, Panel, Paper, PaperFigure
+from gensig.units import from_si
+
+ENGINE = ("system=engine_gear_train", "system.lateral=true")
+FIRING_ORDERS = {
+    "least couples": "excitation=engine_v20",
+    "in sequence": "excitation=engine_v20_in_sequence",
+}
+NODES = {"flywheel": 14, "pump gear": 45}
+# half the peak to peak of the speed in r/min, computed and measured by the paper
+PRINTED = {"flywheel": (15.0, 20.0), "pump gear": (120.0, 125.0)}
+DURATION = 1.0  # s, 14 cycles at 1688 r/min
+SHOWN = 2  # cycles
+N_ORDERS = 80  # half orders
+RPM = from_si("speed_rpm", 1.0)
+ASSUMED = (
+    "Sizes, pressures, firing order, backlash, damping and supports are not printed; all are "
+    "assumed, none is fitted. The drive rattles and is chaotic: numbers scatter by some per cent."
+)
+
+
+@cache
+def response(firing_order: str) -> TimeResponse:
+    """The engine at the point where its gear broke, teeth free to part, gears on supports."""
+    config = compose("generate", (*ENGINE, FIRING_ORDERS[firing_order]))
+    line = read_engine_line(config)
+    point = line.engine.reference
+    return time_response(
+        line,
+        point.speed,
+        point.torque,
+        tabulated=tabulated_meshes(line, config, point.speed, point.torque),
+        nodes=tuple(NODES.values()),
+        duration=DURATION,
+    )
+
+
+def speed(number: str, place: str) -> PaperFigure:
+    """Figures 10 and 11: speed of flywheel and pump gear less its mean, over two cycles."""
+    curves, found = [], []
+    for name in FIRING_ORDERS:
+        motion = response(name)
+        own = RPM * motion.speed[list(NODES).index(place)]
+        cycles = (motion.crank_angle - motion.crank_angle[0]) / (4.0 * math.pi)
+        shown = cycles < SHOWN
+        curves.append(Curve(label=name, x=cycles[shown], y=own[shown]))
+        half = float(np.median(fluctuations(own[None], motion.crank_angle)))
+        found.append(f"{name} {half:.3g} r/min")
+    for label, half in zip(("computed", "measured"), PRINTED[place], strict=True):
+        for end, sign in (("highest", 1.0), ("lowest", -1.0)):
+            curves.append(_level(f"printed, {label}, {end}", sign * half))
+    computed, measured = PRINTED[place]
+    panel = Panel(
+        title=place,
+        x_label="cycles of the engine",
+        y_label="speed less its mean, r/min",
+        curves=tuple(curves),
+    )
+    return PaperFigure(
+        title=f"Speed of the {place} (figure {number})",
+        panels=(panel,),
+        reason=f"Half the peak to peak in a cycle: {', '.join(found)}; printed {computed:g}, "
+        f"measured {measured:g}. {ASSUMED}",
+    )
+
+
+def _level(label: str, value: float) -> Curve:
+    ends = np.array([0.0, SHOWN])
+    return Curve(label=label, x=ends, y=np.full(2, value), is_printed=True)
+
+
+def spectrum(number: str, place: str) -> PaperFigure:
+    """Figures 12 and 13: angular displacement of flywheel and pump gear by orders."""
+    curves = []
+    for name in FIRING_ORDERS:
+        motion = response(name)
+        amplitudes = order_amplitudes(motion.angle, motion.crank_angle, N_ORDERS)
+        own: Array = np.degrees(amplitudes[list(NODES).index(place)])
+        orders: Array = 0.5 * np.arange(1.0, len(own) + 1.0)
+        curves.append(Curve(label=name, x=orders, y=own))
+    panel = Panel(
+        title=place,
+        x_label="order of the crank",
+        y_label="angle, degrees",
+        curves=tuple(curves),
+    )
+    return PaperFigure(
+        title=f"Angular displacement of the {place} (figure {number})",
+        panels=(panel,),
+        reason=f"The scale of the figure is not printed. {ASSUMED}",
+    )
+
+
+PAPER = Paper(
+    title="Bending-torsional coupling of the timing gears of a marine diesel",
+    figures={
+        "10": partial(speed, "10", "flywheel"),
+        "11": partial(speed, "11", "pump gear"),
+        "12": partial(spectrum, "12", "flywheel"),
+        "13": partial(spectrum, "13", "pump gear"),
+    },
+)
