@@ -114,6 +114,27 @@ def _level(label: str, value: float, x: np.ndarray) -> Curve:
     return Curve(label=label, x=ends, y=np.full(2, value), is_printed=True)
 
 
+def bulk() -> PaperFigure:
+    """Figure 4: bulk temperature of both gears from the bore to the root circle."""
+    state = hot_state(duty("gensig's default"))
+    curves = tuple(
+        Curve(label=name, x=body.radius * 1e3, y=body.temperature)
+        for name, body in (("pinion", state.pinion), ("wheel", state.wheel))
+    )
+    panel = Panel(
+        title="bulk temperature",
+        x_label="radius, mm",
+        y_label="temperature, degrees Celsius",
+        curves=curves,
+    )
+    return PaperFigure(
+        title="Bulk temperature (figure 4)",
+        panels=(panel,),
+        reason="The scale of the figure, the oil and its convection are not printed; oil of 60 "
+        "degrees Celsius and 300 W/m2K are assumed.",
+    )
+
+
 def swept(number: str, name: str) -> PaperFigure:
     """Figures 7 to 9: mean hot stiffness over friction, torque or speed."""
     (low, high), printed, x_label, per_si = SWEEPS[name]
@@ -145,6 +166,7 @@ PAPER = Paper(
     title="Time-varying mesh stiffness of helical gears with temperature",
     figures={
         "3": stiffness,
+        "4": bulk,
         **{
             number: partial(swept, number, name)
             for number, name in zip("789", SWEEPS, strict=True)

@@ -7,7 +7,9 @@ from functools import cache
 import numpy as np
 
 from gensig.life.life_laws import life_map
+from gensig.life.wear.archard import flank_radii
 from gensig.life.wear.wear_case import WearCase
+from gensig.life.wear.wear_life import wear_life
 from gensig.operation.options import read_operating
 from gensig.options.compose import compose
 from gensig.papers.paper_figure import Curve, Panel, Paper, PaperFigure
@@ -28,6 +30,8 @@ PRINTED = (
 N_POINTS = 12
 TORQUES = np.geomspace(20.0, 250.0, N_POINTS)  # N m, about those of figure 8
 SPEEDS = np.geomspace(2.0, 30.0, N_POINTS)  # rad/s, about those of figure 9
+FEW_SPEEDS = [2.0, 5.0, 12.5, 30.0]  # rad/s
+INNER = 10  # nodes at either end, beyond which nothing wears
 PRESSURE_ANGLE = "pressure angle at the pinion, rad"
 SHORT = (
     "The transverse contact ratio of table 1 is 0.92 with its addendum of half a module: contact "
@@ -80,6 +84,57 @@ def pressure() -> PaperFigure:
     )
 
 
+def radius() -> PaperFigure:
+    """Figure 7: curvature radius of the pinion's flank, new and worn."""
+    new = case().new_flanks()
+    worn = wear_life(case()).depth[-1][:, 0]
+    load = case().line_load(new)[0]
+    radii = flank_radii(case().path, worn, load, case().material)
+    names = {
+        "new": "new",
+        "worn by 100 um": "worn",
+        "worn, as eq. (22) has it": "by_eq_22",
+    }
+    inner = slice(INNER, -INNER)
+    angle = case().path.pressure_angle[0][inner]
+    curves = tuple(
+        Curve(label=label, x=angle, y=radii[kind][0][inner] * 1e3)
+        for label, kind in names.items()
+    )
+    panel = Panel(
+        title="pinion",
+        x_label=PRESSURE_ANGLE,
+        y_label="curvature radius, mm",
+        curves=curves,
+    )
+    return PaperFigure(
+        title="Curvature radius after wear (figure 7)",
+        panels=(panel,),
+        reason="Eq. (22) takes half the depth off the radius, a shift and no curvature. The "
+        "profile that wear leaves is flatter in places and more curved in others.",
+    )
+
+
+def lives() -> PaperFigure:
+    """Figure 10: life over torque and speed."""
+    found = life_map(case(), TORQUES.tolist(), FEW_SPEEDS).hours
+    curves = tuple(
+        Curve(label=f"{speed:g} rad/s", x=TORQUES, y=hours)
+        for speed, hours in zip(FEW_SPEEDS, found.T, strict=True)
+    )
+    panel = Panel(
+        title="life to 100 um, the paper's conventions",
+        x_label="torque, N m",
+        y_label="life, h",
+        curves=curves,
+    )
+    return PaperFigure(
+        title="Wear life over torque and speed (figure 10)",
+        panels=(panel,),
+        reason=FITS,
+    )
+
+
 def life_over_torque() -> PaperFigure:
     """Figure 8: life over torque beside the printed fit, eq. (25)."""
     speed = _speed()
@@ -125,7 +180,9 @@ PAPER = Paper(
     figures={
         "5": sliding,
         "6": pressure,
+        "7": radius,
         "8": life_over_torque,
         "9": life_over_speed,
+        "10": lives,
     },
 )

@@ -92,6 +92,19 @@ def test_the_pump_gear_fluctuates_as_printed(written):
         assert 0.75 < np.mean(halves) / 120.0 < 1.4
 
 
+def test_dampers_lower_the_root_stress_that_pairs_share(written):
+    """As in the paper: by a sixth or more, to about the printed values."""
+    largest = {}
+    for number in ("14", "16"):
+        curves, printed = points(written("engine"), f"engine_{number}")
+        assert printed == {"printed"}
+        mine = {label: xy for (_, label), xy in curves.items()}
+        largest[number] = mine["largest of all pairs"][1].max()
+        assert 0.8 < largest[number] / mine["printed"][1, 0] < 1.6
+        assert mine["one pair, ISO 6336-3"][1, 0] > 1.3 * largest[number]
+    assert largest["16"] < 0.9 * largest["14"]
+
+
 def test_a_missing_tooth_is_an_impact_a_turn_by_the_papers_equations(written):
     curves, _ = points(written("spur"), "spur_14")
     highest = {
@@ -106,7 +119,7 @@ def test_a_missing_tooth_is_an_impact_a_turn_by_the_papers_equations(written):
     ("words", "told"),
     [
         (["nope"], "no such paper; take one of spur, helical_heat"),
-        (["wear", "12"], "simulation draws figures 5, 6, 8, 9 of this paper"),
+        (["wear", "12"], "simulation draws figures 5, 6, 7, 8, 9, 10 of this paper"),
     ],
 )
 def test_what_is_not_there_is_named(tmp_path, capsys, words, told):
