@@ -35,6 +35,8 @@ def figures(arguments: Namespace) -> int:
                 f"{', '.join(paper.figures)} of this paper"
             )
     folder = Path(arguments.dir)
+    if folder.exists() and not folder.is_dir():
+        raise ConfigError(f"--dir {folder}: a file has this name; give a folder")
     folder.mkdir(parents=True, exist_ok=True)
     print(paper.title)
     for number in numbers:

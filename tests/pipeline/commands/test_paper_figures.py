@@ -126,3 +126,11 @@ def test_what_is_not_there_is_named(tmp_path, capsys, words, told):
     assert main(["figures", *words, "--dir", str(tmp_path / "new")]) == 2
     assert told in capsys.readouterr().err
     assert not (tmp_path / "new").exists()
+
+
+def test_a_file_is_no_folder(tmp_path, capsys):
+    file = tmp_path / "figures"
+    file.write_text("mine")
+    assert main(["figures", "wear", "5", "--dir", str(file)]) == 2
+    assert "a file has this name; give a folder" in capsys.readouterr().err
+    assert file.read_text() == "mine"
