@@ -6,10 +6,12 @@ Verbs, help, and one line for a mistake. Everything heavy is imported when neede
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import sys
 from collections.abc import Sequence
 from typing import Any
 
+from gensig.errors import ConfigError
 from gensig.terminal.program import HELP_FLAGS, Parser, exit_text, guarded, refuse_verb
 from gensig.version import __version__
 
@@ -36,6 +38,13 @@ OF_GENSIG = (
     "reproduce",
 )
 PROGRAM = "diagnose"
+# module -> package of the extra, which an installation of gensig alone does not have
+EXTRA = {
+    "torch": "torch",
+    "sklearn": "scikit-learn",
+    "safetensors": "safetensors",
+}
+INSTALL = "pip install 'gensig[diagnose]'"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -72,9 +81,23 @@ def _dispatch(words: list[str]) -> int:
     verb, *rest = words
     try:
         arguments = verb_parser(verb).parse_intermixed_args(rest)
+        _require_packages()
         return int(_module(verb).run(arguments))
     except SystemExit as leaving:  # --help
         return int(leaving.code or 0)
+
+
+def _require_packages() -> None:
+    """Raise ConfigError where a package of the extra is missing, before any work begins."""
+    missing = [name for module, name in EXTRA.items() if not _is_installed(module)]
+    if missing:
+        raise ConfigError(f"{PROGRAM} needs {', '.join(missing)}: {INSTALL}")
+
+
+def _is_installed(module: str) -> bool:
+    if module in sys.modules:
+        return sys.modules[module] is not None
+    return importlib.util.find_spec(module) is not None
 
 
 def verb_parser(name: str) -> Parser:

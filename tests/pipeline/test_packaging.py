@@ -1,6 +1,7 @@
 """Source distribution and wheel: their files, and the wheel at work in any folder."""
 
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -127,6 +128,40 @@ def test_wheel_runs_from_another_folder(python, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["data"]
 
 
+def interpreters():
+    """Commands of the supported Pythons that this machine has."""
+    found = []
+    for text in PROJECT["classifiers"]:
+        if match := re.fullmatch(r"Programming Language :: Python :: (3\.\d+)", text):
+            command = shutil.which(f"python{match[1]}")
+            if command and not subprocess.run([command, "-V"], check=False).returncode:
+                found.append(pytest.param(command, id=match[1]))
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", interpreters())
+def test_wheel_alone_makes_a_record_without_torch(command, wheel, tmp_path):
+    """Installed by pip with what it asks for, and nothing else; needs a package index."""
+
+    def run(*words, status=0):
+        options = {"cwd": tmp_path, "env": ENVIRONMENT, "text": True}
+        done = subprocess.run(words, capture_output=True, check=False, **options)
+        assert done.returncode == status, done.stderr
+        return done.stdout + done.stderr
+
+    run(command, "-m", "venv", "env")
+    programs = tmp_path / "env" / "bin"
+    run(programs / "python", "-m", "pip", "install", "--quiet", wheel)
+    run(programs / "gensig", *RECORD, "out=data")
+    run(programs / "gensig", "verify", "data")
+    listed = run(programs / "python", "-m", "pip", "list", "--format=freeze").lower()
+    assert not re.search(r"^(torch|nvidia|scikit.learn|safetensors)", listed, re.M)
+    told = run(programs / "diagnose", "train", "data=data", "out=report", status=2)
+    assert told.count("\n") == 1
+    assert "pip install 'gensig[diagnose]'" in told
+
+
 def test_tests_run_from_the_wheel(source, python):
     """A file of them; `make wheel-test` runs all."""
     take_packages_out(source, python)
@@ -161,7 +196,8 @@ def test_all_is_every_extra_that_a_command_asks_for():
     extras = PROJECT["optional-dependencies"]
     of_commands = [name for name in extras if name not in NOT_FOR_COMMANDS]
     needed = {line for name in of_commands for line in extras[name]}
-    assert needed <= {*extras["test"], "torch>=2.6"}  # tests try them
+    # tests try them
+    assert needed <= {*extras["test"], *extras["diagnose"], "torch>=2.6"}
     assert extras["all"] == [f"gensig[{','.join(of_commands)}]"]
     named = set()
     for name in ("gensig", "diagnose", "configs", "docs"):

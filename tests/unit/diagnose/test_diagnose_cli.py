@@ -307,3 +307,26 @@ def test_diagnose_loads_neither_numba_nor_the_physics():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (done.stdout.strip(), done.stderr) == ("[]", "")
+
+
+@pytest.mark.parametrize("missing", ["torch", "sklearn", "safetensors"])
+def test_without_its_packages_it_says_what_to_install(missing, tmp_path):
+    def run(*words):
+        code = (
+            f"import sys; sys.modules[{missing!r}] = None; "
+            f"from diagnose.cli import main; sys.exit(main({list(words)!r}))"
+        )
+        command = [sys.executable, "-c", code]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+
+    for words in (
+        ("train", "data=nothere", "out=report"),
+        ("predict", "nothere.csv", "--speed-rpm", "1800"),
+        ("evaluate", "model_dir=nothere"),
+    ):
+        done = run(*words)
+        assert done.returncode == 2
+        name = missing.replace("sklearn", "scikit-learn")
+        expected = f"diagnose: diagnose needs {name}: pip install 'gensig[diagnose]'\n"
+        assert done.stderr == expected
+    assert run("--help").returncode == run("train", "--help").returncode == 0
