@@ -27,6 +27,7 @@ from gensig.record.inputs import (
 from gensig.record.options import AS_GIVEN, CROSSED, read_plan_options
 from gensig.record.streams import Stream, stream
 from gensig.sensing.instrument import Instrument
+from gensig.sensing.options import read_sensing
 from gensig.systems.registry import read_system
 from gensig.systems.run import CleanRecord
 
@@ -222,10 +223,10 @@ def _check_fault_and_noise(config: Configuration) -> None:
             "choose a fault, for instance fault=crack "
             "(plan.sham=true leaves it out as a control)"
         )
-    if sensing["snr_db"] is None:
+    if not read_sensing(config.section("sensing")).has_noise:
         raise ConfigError(
             "sensing.snr_db = null: without noise every fault is seen; "
-            "give a signal-to-noise ratio in dB"
+            "give a signal-to-noise ratio in dB, or sensing.noise.level_m_per_s2"
         )
     if sensing["snr_reference"] != "healthy_twin":
         raise ConfigError(
@@ -305,7 +306,8 @@ def _contrasts(
 def _noise_power(inputs: RecordInputs, sound: CleanRecord) -> Array:
     instrument, sensing = inputs.instrument, inputs.machine.sensing
     reference = instrument.power(instrument.measure(sound.acceleration))
-    return reference * sensing.noise_factor(float(sensing.snr or 0.0))
+    n_samples = round(inputs.machine.operating.duration * sensing.sampling_rate)
+    return sensing.noise_power(reference, n_samples)
 
 
 def _power_at_set_point(config: Configuration, n_units: int) -> Array:

@@ -107,15 +107,13 @@ class _Measured:
         """
         instrument = self.inputs.instrument
         sensing = instrument.sensing
-        if sensing.snr is None:
-            return np.zeros(len(signal))
         reference = self.twin_power
-        if sensing.snr_reference != "healthy_twin":
+        if not sensing.noise_follows_twin:
             reference = instrument.power(signal)
         if isinstance(reference, SimulationError):
             raise reference
         assert reference is not None
-        return reference * sensing.noise_factor(sensing.snr)
+        return sensing.noise_power(reference, signal.shape[-1])
 
     def healthy_twin(self) -> Array:
         """Output of the sensors on the same record without its faults.
@@ -312,9 +310,7 @@ def _missing_twins(
     twins: dict[TwinKey, RecordInputs] = {}
     shared: dict[TwinKey, RecordInputs] = {}
     for each, key in zip(inputs, keys, strict=True):
-        sensing = each.machine.sensing
-        follows_twin = sensing.snr_reference == "healthy_twin"
-        if sensing.snr is None or not follows_twin or key in _TWINS:
+        if not each.machine.sensing.noise_follows_twin or key in _TWINS:
             continue
         twin = each.healthy_twin()
         twins.setdefault(key, twin)

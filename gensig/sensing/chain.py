@@ -15,7 +15,8 @@ from gensig.errors import ConfigError
 from gensig.sensing.accelerometer import Accelerometer
 from gensig.sensing.encoder import Encoder
 from gensig.sensing.measured_path import ImpulseResponses, MeasuredPath, read_responses
-from gensig.sensing.noise import Noise, Receiver, ThroughPath
+from gensig.sensing.noise import Noise
+from gensig.sensing.noise_parts import Receiver, ThroughPath
 from gensig.sensing.tachometer import Tachometer
 from gensig.sensing.tones import Nuisance
 from gensig.sensing.transfer_path import ModalPath
@@ -52,8 +53,8 @@ class Sensing:
 
     ``channels`` are the simulated accelerations; a key of ``IN_PLACE`` alone stands for such
     of every gear until the machine is known (``of_machine``). Without a ``path`` the sensors feel
-    these; a path leads from them to the ``sensors``. ``snr`` in dB; None records without noise.
-    Its reference is the power of the same unit at the same condition without the fault
+    these; a path leads from them to the ``sensors``. ``snr`` in dB; None records without noise,
+    or with noise of a level that ``noise`` sets. Its reference is the power of the same unit at the same condition without the fault
     (``healthy_twin``), so the floor does not reveal the class. None for ``sensor`` is an ideal
     one, None for ``noise`` is white noise over the whole band. ``nuisances`` shake the bearings
     of every class.
@@ -100,6 +101,34 @@ class Sensing:
         if self.noise is not None and self.noise.offsets is not None:
             louder = np.array(self.noise.offsets)
         return 10.0 ** (-snr / 10.0) * 10.0 ** (louder / 10.0)
+
+    @property
+    def has_noise(self) -> bool:
+        """True where a record gets any noise."""
+        is_absolute = self.noise is not None and self.noise.level_key != ""
+        return self.snr is not None or is_absolute
+
+    @property
+    def noise_follows_twin(self) -> bool:
+        """True where the healthy twin of a record decides the level of its noise."""
+        return self.snr is not None and self.snr_reference == "healthy_twin"
+
+    def noise_power(self, reference: Array, n_samples: int) -> Array:
+        """Mean square of the noise in its band, (sensor,) (m/s2)^2.
+
+        Parameters
+        ----------
+        reference : (sensor,) (m/s2)^2    power that the ratio ``snr`` refers to
+        n_samples : samples of a record
+        """
+        if self.snr is not None:
+            return np.asarray(reference * self.noise_factor(self.snr))
+        absolute = None
+        if self.noise is not None:
+            absolute = self.noise.absolute_power(self.receiver(n_samples))
+        if absolute is None:
+            return np.zeros(len(self.channel_names))
+        return absolute
 
     @property
     def n_lead(self) -> int:
@@ -242,6 +271,11 @@ class Sensing:
                 )
 
     def _check_noise(self, noise: Noise) -> None:
+        if noise.level_key and self.snr is not None:
+            raise ConfigError(
+                f"sensing.snr_db = {self.snr:g} and sensing.noise.{noise.level_key} both "
+                "set the level of the noise: add sensing.snr_db=null"
+            )
         half = 0.5 * self.sampling_rate
         if noise.band is not None and noise.band[1] > half:
             raise ConfigError(

@@ -20,7 +20,7 @@ from gensig.sensing.chain import (
 from gensig.sensing.dropped import draw_dropped, filled
 from gensig.sensing.gain_drift import draw_drift
 from gensig.sensing.measured_path import ImpulseResponses
-from gensig.sensing.noise import band_power
+from gensig.sensing.noise_parts import band_power
 from gensig.sensing.transfer_path import Housing, ModalPath, draw_housing
 
 Array = NDArray[np.float64]

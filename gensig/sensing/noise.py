@@ -3,292 +3,33 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
-from functools import lru_cache
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError
-from gensig.sensing.tones import Limits
-from gensig.sensing.transfer_path import SETTLED, mode_section
-from gensig.text.user_file import check_columns, check_rate, read_table
-from gensig.units import check_limits, check_positive, is_number, read_kind, unit
+from gensig.sensing.noise_parts import (
+    Background,
+    FromFile,
+    Hum,
+    Impulsive,
+    Machine,
+    Part,
+    Pink,
+    Receiver,
+    Spectrum,
+    ThroughPath,
+    White,
+    band_power,
+    unit_power,
+)
+from gensig.signals.recording import STANDARD_GRAVITY
+from gensig.units import is_number, read_kind
 
 Array = NDArray[np.float64]
-
-BLOCK = 256  # samples
-# assumed; amplitude of the first pair of sidebands of another machine's tones, over the tone's
-SIDEBAND = 0.5
-FILE_KEY = "sensing.noise: file"
-SHARED = "background"  # column of a file that stands for all sensors
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Receiver:
-    """Sensors that hear the noise of one record.
-
-    ``through_path`` makes white noise at the bearings as the sensors hear it.
-    """
-
-    sensors: tuple[str, ...]
-    n_samples: int
-    sampling_rate: float
-    through_path: Callable[[np.random.Generator], Array] | None = None
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """(sensor, sample)."""
-        return len(self.sensors), self.n_samples
-
-    @property
-    def frequency(self) -> Array:
-        """Frequencies of the record's spectrum, (line,) Hz."""
-        step = 1.0 / self.sampling_rate
-        return np.asarray(np.fft.rfftfreq(self.n_samples, step), dtype=np.float64)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Part(ABC):
-    """One part of the noise.
-
-    ``share`` is its power relative to the other parts. ``limits`` are those of fields that need
-    not be positive only; ``is_broad`` is True where any band has some of the noise.
-    """
-
-    limits: ClassVar[Limits] = {}
-    is_broad: ClassVar[bool] = True
-    share: float
-
-    def __post_init__(self) -> None:
-        names = [field.name for field in fields(self) if field.name != "file"]
-        check_positive(self, "", *(name for name in names if name not in self.limits))
-        check_limits(self, "", **self.limits)
-
-    @abstractmethod
-    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
-        """Noise at any level, (sensor, sample)."""
-
-    def check(self, receiver: Receiver) -> None:  # noqa: B027  most parts have no file
-        """Raise ConfigError where a user's file does not fit the sensors of a record."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class White(Part):
-    """Gaussian, independent from sensor to sensor."""
-
-    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
-        """As ``Part.make``."""
-        return rng.standard_normal(receiver.shape)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Pink(Part):
-    """Gaussian, power density 1 / f above ``lowest``, even below."""
-
-    lowest: float = unit("hz")
-
-    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
-        """As ``Part.make``."""
-        spectrum = np.fft.rfft(rng.standard_normal(receiver.shape), axis=1)
-        pink = spectrum / np.sqrt(np.maximum(receiver.frequency, self.lowest))
-        return np.fft.irfft(pink, receiver.n_samples, axis=1)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ThroughPath(Part):
-    """White noise at the bearings, coloured by the transfer path; sensors hear the same sources."""
-
-    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
-        """As ``Part.make``."""
-        if receiver.through_path is None:
-            raise ValueError("noise coloured by the path needs one")
-        return receiver.through_path(rng)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Hum(Part):
-    """Mains pick-up.
-
-    Harmonic k has the amplitude 1 / k (assumed) and a separate phase in each sensor.
-    """
-
-    is_broad: ClassVar[bool] = False
-    mains: float = unit("hz")
-    n_harmonics: int
-
-    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
-        """As ``Part.make``."""
-        harmonic = np.arange(1.0, self.n_harmonics + 1.0)
-        return tones(rng, receiver, self.mains * harmonic, 1.0 / harmonic)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Impulsive(Part):
-    """Knocks at random instants, normal in size, each ringing at one mode.
-
-    The instants are Poisson distributed; a record has at least one.
-    """
-
-    limits: ClassVar[Limits] = {"damping_ratio": (1e-3, 1.0)}
-    knocks: float = unit("hz")
-    ring: float = unit("hz")
-    damping_ratio: float
-
-    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
-        """As ``Part.make``."""
-        from scipy.signal import sosfilt
-
-        rate, n_sensors = receiver.sampling_rate, len(receiver.sensors)
-        settling = SETTLED / (2.0 * math.pi * self.ring * self.damping_ratio)
-        n_before = math.ceil(settling * rate)
-        force = np.zeros((n_sensors, n_before + receiver.n_samples))
-        n_knocks = rng.poisson(self.knocks * force.shape[1] / rate)
-        for instant in rng.integers(0, force.shape[1], n_knocks).tolist():
-            force[:, instant] += rng.standard_normal(n_sensors)
-        certain = n_before + rng.integers(receiver.n_samples)
-        force[:, certain] += rng.standard_normal(n_sensors)
-        section = mode_section(self.ring, self.damping_ratio, rate)
-        return np.asarray(sosfilt(section, force, axis=1)[:, n_before:])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Machine(Part):
-    """Another machine: shaft orders, a bearing's tone family and a mesh, a third of the power each.
-
-    Harmonic k has the amplitude 1 / k. Bearing and mesh tones have sidebands at one shaft order
-    (assumed). ``frequency_scatter`` is the largest share by which its speed differs in a record.
-    Tones above the usable band are left out.
-    """
-
-    is_broad: ClassVar[bool] = False
-    limits: ClassVar[Limits] = {"frequency_scatter": (0.0, 0.5)}
-    shaft: float = unit("hz")
-    frequency_scatter: float
-    n_shaft_orders: int
-    bearing_order: float
-    n_bearing_harmonics: int
-    n_teeth: int
-    n_mesh_harmonics: int
-
-    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
-        """As ``Part.make``."""
-        shaft = self.shaft * (1.0 + self.frequency_scatter * rng.uniform(-1.0, 1.0))
-        highest = usable_band(receiver.sampling_rate)[1]
-        alone = {0.0: 1.0}  # amplitude over the harmonic's, by offset in shaft orders
-        modulated = {-1.0: SIDEBAND, 0.0: 1.0, 1.0: SIDEBAND}
-        families = (
-            (1.0, self.n_shaft_orders, alone),
-            (self.bearing_order, self.n_bearing_harmonics, modulated),
-            (float(self.n_teeth), self.n_mesh_harmonics, modulated),
-        )
-        out = np.zeros(receiver.shape)
-        for order, n_harmonics, lines in families:
-            harmonic = np.arange(1, n_harmonics + 1)[:, None]
-            orders = (order * harmonic + list(lines)).ravel()
-            amplitude = (np.array(list(lines.values())) / harmonic).ravel()
-            heard = (orders > 0.0) & (orders * shaft <= highest)
-            family = tones(rng, receiver, shaft * orders[heard], amplitude[heard])
-            out += unit_power(family)
-        return out
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Background(Part):
-    """Recording of a user: ``time_s`` and one column a sensor, or one column ``background``.
-
-    A record takes a stretch that begins anywhere. With one column for all sensors, each sensor
-    takes a different stretch.
-    """
-
-    file: str
-
-    def check(self, receiver: Receiver) -> None:
-        """As ``Part.check``."""
-        _background(self.file, receiver)
-
-    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
-        """As ``Part.make``."""
-        columns, is_shared = _background(self.file, receiver)
-        n_samples, n_sensors = receiver.n_samples, len(columns)
-        last = columns.shape[1] - n_samples
-        if is_shared:
-            starts = rng.integers(0, last, n_sensors, endpoint=True).tolist()
-        else:
-            starts = [int(rng.integers(0, last, endpoint=True))] * n_sensors
-        stretches = zip(columns, starts, strict=True)
-        return np.stack([row[start : start + n_samples] for row, start in stretches])
-
-
-def _background(file: str, receiver: Receiver) -> tuple[Array, bool]:
-    """Recording of each sensor, (sensor, sample), and True where it is one for all."""
-    time, columns, is_shared = _user_columns(
-        file, "time_s", receiver.sensors, max(2, receiver.n_samples)
-    )
-    check_rate(FILE_KEY, file, time, receiver.sampling_rate)
-    if not np.all(np.ptp(columns, axis=1) > 0.0):
-        raise ConfigError(
-            f"{FILE_KEY} = {file}: a column holds one value throughout; give what a sensor heard"
-        )
-    return columns, is_shared
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Spectrum(Part):
-    """Gaussian noise of a given power density.
-
-    The file has ``frequency_hz`` and one column a sensor, or ``background``. Only the form of a
-    column counts; its level is that of ``sensing.snr_db``. The density is linear between the
-    lines given and held beyond them. Noise differs between records and sensors.
-    """
-
-    file: str
-
-    def check(self, receiver: Receiver) -> None:
-        """As ``Part.check``."""
-        _spectrum(self.file, receiver.sensors)
-
-    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
-        """As ``Part.make``."""
-        frequency, density = _spectrum(self.file, receiver.sensors)
-        grid = receiver.frequency
-        size = np.sqrt([np.interp(grid, frequency, row) for row in density])
-        spectrum = size * np.fft.rfft(rng.standard_normal(receiver.shape), axis=1)
-        return np.fft.irfft(spectrum, receiver.n_samples, axis=1)
-
-
-def _spectrum(file: str, sensors: tuple[str, ...]) -> tuple[Array, Array]:
-    """Frequencies (line,) in Hz and densities (sensor, line)."""
-    frequency, density, _ = _user_columns(file, "frequency_hz", sensors, 2)
-    if frequency[0] < 0.0 or not np.all(np.diff(frequency) > 0.0):
-        raise ConfigError(
-            f"{FILE_KEY} = {file}: frequency_hz must rise from line to line and not be negative"
-        )
-    if density.min() < 0.0 or not np.all(density.max(axis=1) > 0.0):
-        raise ConfigError(
-            f"{FILE_KEY} = {file}: a power density must not be negative, nor 0 throughout"
-        )
-    return frequency, density
-
-
-@lru_cache(maxsize=4)
-def _user_columns(
-    file: str, axis: str, sensors: tuple[str, ...], least_rows: int
-) -> tuple[Array, Array, bool]:
-    """Axis (row,) and columns (sensor, row) of a file; True where sensors share one column."""
-    names, values = read_table(FILE_KEY, file, least_rows=least_rows)
-    is_shared = SHARED in names
-    wanted = list(sensors)
-    if is_shared:
-        wanted = [SHARED] * len(sensors)
-    check_columns(FILE_KEY, file, names, [axis, *dict.fromkeys(wanted)])
-    columns = values[[names.index(name) for name in wanted]]
-    return values[names.index(axis)], columns, is_shared
-
 
 PARTS: dict[str, type[Part]] = {
     "white": White,
@@ -301,18 +42,33 @@ PARTS: dict[str, type[Part]] = {
     "spectrum": Spectrum,
 }
 
+# keys that set the level of the noise whatever the signal is
+LEVELS = ("level_m_per_s2", "density_ug_per_sqrt_hz", "file_level")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Noise:
-    """Parts of the noise, and the band of the signal-to-noise ratio, (low, high) in Hz or all.
+    """Parts of the noise, the band in which its power counts, and its level.
 
-    ``offsets`` in dB, one a sensor: the noise of that sensor is so much louder than
-    ``sensing.snr_db`` asks for. None is 0 dB.
+    Attributes
+    ----------
+    parts : kinds of noise with their shares of the power
+    band : (low, high) in Hz in which the power of the noise counts; None is the whole band
+    offsets : dB, one a sensor, by which the noise of that sensor is louder; None is 0 dB
+    level_m_per_s2 : RMS in the band
+    density_ug_per_sqrt_hz : root of the mean power density over the band, in 1e-6 g / sqrt(Hz)
+    file_level : True for the level of the file of its only part
+
+    At most one of the last three is given. Without any, the noise follows the signal by
+    ``sensing.snr_db``.
     """
 
     parts: tuple[Part, ...]
     band: tuple[float, ...] | None = None
     offsets: tuple[float, ...] | None = None
+    level_m_per_s2: float | None = None
+    density_ug_per_sqrt_hz: float | None = None
+    file_level: bool = False
 
     def __post_init__(self) -> None:
         if not self.parts:
@@ -320,6 +76,7 @@ class Noise:
                 "sensing.noise.parts = [] has no part; "
                 "give one, or sensing.snr_db=null for no noise"
             )
+        self._check_level()
         if self.band is None:
             return
         if len(self.band) != 2 or not 0.0 <= self.band[0] < self.band[1]:
@@ -331,6 +88,55 @@ class Noise:
                 "sensing.noise.band_hz: tones alone may miss the band; "
                 "add a part such as white, or null"
             )
+
+    def _check_level(self) -> None:
+        given = [key for key in LEVELS if getattr(self, key) not in (None, False)]
+        if len(given) > 1:
+            raise ConfigError(
+                f"sensing.noise: {' and '.join(given)} both set the level; give one"
+            )
+        for key in LEVELS[:2]:
+            value = getattr(self, key)
+            if value is not None and not (value > 0.0 and math.isfinite(value)):
+                raise ConfigError(
+                    f"sensing.noise.{key} = {value:g} must be positive, or null"
+                )
+        is_of_file = len(self.parts) == 1 and isinstance(self.parts[0], FromFile)
+        if self.file_level and not is_of_file:
+            raise ConfigError(
+                "sensing.noise.file_level: the level of a file needs one part of kind "
+                "file or spectrum, and no other"
+            )
+
+    @property
+    def level_key(self) -> str:
+        """Key that sets the level whatever the signal is; empty where none does."""
+        for key in LEVELS:
+            if getattr(self, key) not in (None, False):
+                return key
+        return ""
+
+    def absolute_power(self, receiver: Receiver) -> Array | None:
+        """Mean square in the band whatever the signal is, (sensor,) (m/s2)^2.
+
+        None where the noise follows the signal.
+        """
+        power = self._power_before_offsets(receiver)
+        if power is None or self.offsets is None:
+            return power
+        return np.asarray(power * 10.0 ** (np.array(self.offsets) / 10.0))
+
+    def _power_before_offsets(self, receiver: Receiver) -> Array | None:
+        part = self.parts[0]
+        if self.file_level and isinstance(part, FromFile):
+            return part.power(receiver, self.band)
+        if self.level_m_per_s2 is not None:
+            return np.full(len(receiver.sensors), self.level_m_per_s2**2)
+        if self.density_ug_per_sqrt_hz is None:
+            return None
+        low, high = self.band or (0.0, 0.5 * receiver.sampling_rate)
+        root_density = 1e-6 * STANDARD_GRAVITY * self.density_ug_per_sqrt_hz
+        return np.full(len(receiver.sensors), root_density**2 * (high - low))
 
     @property
     def is_white(self) -> bool:
@@ -356,10 +162,12 @@ def read_noise(values: Any) -> Noise:
     ConfigError    for unknown kinds, keys or values, naming the part
     """
     where = "sensing.noise"
+    optional = {"offsets_db", *LEVELS}
     needed = {"parts", "band_hz"}
-    if not isinstance(values, Mapping) or set(values) - {"offsets_db"} != needed:
+    if not isinstance(values, Mapping) or set(values) - optional != needed:
         raise ConfigError(
-            f"{where} must be a group of the keys parts and band_hz, and may have offsets_db"
+            f"{where} must be a group of the keys parts and band_hz, and may have "
+            f"{', '.join(sorted(optional))}"
         )
     parts = values["parts"]
     if not isinstance(parts, list | tuple):
@@ -377,7 +185,26 @@ def read_noise(values: Any) -> Noise:
             values.get("offsets_db"),
             "a list of numbers, one a sensor",
         ),
+        level_m_per_s2=_number(values, "level_m_per_s2"),
+        density_ug_per_sqrt_hz=_number(values, "density_ug_per_sqrt_hz"),
+        file_level=_flag(values, "file_level"),
     )
+
+
+def _number(values: Mapping[str, Any], key: str) -> float | None:
+    value = values.get(key)
+    if value is None:
+        return None
+    if not is_number(value):
+        raise ConfigError(f"sensing.noise.{key} = {value!r} must be a number, or null")
+    return float(value)
+
+
+def _flag(values: Mapping[str, Any], key: str) -> bool:
+    value = values.get(key, False)
+    if not isinstance(value, bool):
+        raise ConfigError(f"sensing.noise.{key} = {value!r} must be true or false")
+    return value
 
 
 def _numbers(key: str, value: Any, what: str) -> tuple[float, ...] | None:
@@ -386,47 +213,3 @@ def _numbers(key: str, value: Any, what: str) -> tuple[float, ...] | None:
     if not isinstance(value, list | tuple) or not all(map(is_number, value)):
         raise ConfigError(f"{key} = {value!r} must be {what}, or null")
     return tuple(map(float, value))
-
-
-def tones(
-    rng: np.random.Generator, receiver: Receiver, frequency: Array, amplitude: Array
-) -> Array:
-    """Sum of tones, each with a random phase in each sensor, (sensor, sample)."""
-    n_samples = receiver.n_samples
-    blocks = np.arange(-(-n_samples // BLOCK))[:, None] * BLOCK
-    phases = rng.uniform(0.0, 2.0 * np.pi, (len(receiver.sensors), len(frequency)))
-    out = np.zeros(receiver.shape)
-    for number, (line, size) in enumerate(zip(frequency, amplitude, strict=True)):
-        step = 2j * np.pi * line / receiver.sampling_rate
-        # e^(i w t) as a product: two short tables in place of as many functions as samples
-        table = np.exp(step * blocks) * np.exp(step * np.arange(BLOCK))
-        rotating = table.ravel()[:n_samples]
-        phase = phases[:, number, None]
-        out += size * (np.cos(phase) * rotating.real - np.sin(phase) * rotating.imag)
-    return out
-
-
-def unit_power(signal: Array) -> Array:
-    """Signal without its mean at mean square 1; silence stays silence."""
-    centred = signal - signal.mean(axis=1, keepdims=True)
-    level = np.sqrt(np.mean(centred**2, axis=1, keepdims=True))
-    silence = np.zeros_like(centred)
-    return np.asarray(np.divide(centred, level, out=silence, where=level > 0.0))
-
-
-def band_power(
-    signal: Array, sampling_rate: float, band: tuple[float, ...] | None
-) -> Array:
-    """Mean square without the mean, in a band with both its ends, (sensor,).
-
-    None is the whole band.
-    """
-    if band is None:
-        return np.var(signal, axis=-1)
-    n_samples = signal.shape[-1]
-    frequency = np.fft.rfftfreq(n_samples, 1.0 / sampling_rate)
-    inside = (frequency >= band[0]) & (frequency <= band[1]) & (frequency > 0.0)
-    lines = np.abs(np.fft.rfft(signal, axis=-1)) ** 2 * (2.0 / n_samples**2)
-    if n_samples % 2 == 0:
-        lines[..., -1] *= 0.5
-    return np.asarray(np.sum(lines[..., inside], axis=-1))

@@ -10,7 +10,8 @@ from refusals import refused
 from scipy.signal import butter, sosfilt
 from sensing_groups import MACHINE
 
-from gensig.sensing.noise import PARTS, Receiver, band_power, read_noise
+from gensig.sensing.noise import PARTS, read_noise
+from gensig.sensing.noise_parts import Receiver, band_power
 
 RATE = 51200.0
 POWER = np.array([2.0, 0.3])
