@@ -51,7 +51,8 @@ def test_every_package_that_is_needed_has_its_licence_told() -> None:
         *(line for extra in asked_for for line in extras[extra]),
     ]
     told = " ".join(re.findall(r"^\| (.*?) \|", text("THIRD-PARTY.md"), re.M))
-    names = {re.split(r"[<>=]", line)[0].lower() for line in needed}
+    others = [line for line in needed if not line.startswith("gensig[")]
+    names = {re.split(r"[<>=]", line)[0].lower() for line in others}
     assert names - set(re.split(r"[^\w-]+", told.lower())) == set()
 
 

@@ -69,6 +69,12 @@ REFUSED = {
     "bearing noise.offsets_db=loud": "must be a list of numbers, one a sensor",
     "bearing noise.offsets_db=[x]": "must be a list of numbers, one a sensor",
     "bearing noise.offsets_db=[.nan]": "must be a list of numbers, one a sensor",
+    "bearing snr_db=null noise.level_m_per_s2=0": "level_m_per_s2 = 0 must be positive, or null",
+    "bearing snr_db=null noise.level_m_per_s2=loud": "level_m_per_s2 = 'loud' must be a number",
+    "bearing snr_db=null noise.file_level=true": "needs one part of kind file or spectrum",
+    "bearing snr_db=null noise.file_level=1": "file_level = 1 must be true or false",
+    "bearing snr_db=null noise.level_m_per_s2=1 noise.density_ug_per_sqrt_hz=1": "give one",
+    "bearing noise.level_m_per_s2=1": "both set the level of the noise: add sensing.snr_db=null",
     # nuisances
     "bearing nuisances=null": "sensing.nuisances = None must be a list of parts",
     "bearing nuisances={kind: bearing}": "must be a list of parts",
