@@ -74,6 +74,10 @@ NEW_GEARBOX = (
             "help": "folder of your options (default: configs)",
         },
     ),
+    switch(
+        "--no-level",
+        help="do not simulate healthy machines to tell how loud they are",
+    ),
     switch("--json", help="print what was derived as JSON"),
 )
 

@@ -33,6 +33,7 @@ from gensig.driveline.table_rows import (
     mesh_of,
     motor_and_load,
     node_of,
+    relief_of,
     rows_of_nodes,
     shaft_of,
 )
@@ -41,6 +42,7 @@ from gensig.errors import ConfigError
 from gensig.geometry.contact import SIDES, GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
+from gensig.mesh.modification import PLAIN, FlankModification, PairModification
 from gensig.options.configuration import Configuration
 from gensig.systems.pair_machine import GearPairMachine, pair_dynamics
 from gensig.systems.registry import read_material
@@ -56,7 +58,8 @@ class DriveLine:
     records are made of, None for the first; ``slices_helical`` whether helical meshes in time are
     sliced teeth; ``motor_node``, ``load_node`` those of a motor and its load, None where a branched
     line leaves them open; ``support_forces`` (gear,) N are those for which the supports of the
-    gears are taken, empty without lateral motion.
+    gears are taken, empty without lateral motion; ``reliefs`` (gear,) the tip reliefs of the
+    table, empty where it has none.
     """
 
     name: str
@@ -70,6 +73,16 @@ class DriveLine:
     motor_node: int | None = None
     load_node: int | None = None
     support_forces: tuple[float, ...] = ()
+    reliefs: tuple[FlankModification, ...] = ()
+
+    def relief(self, mesh: int) -> PairModification:
+        """Tip reliefs of the two gears of a mesh by the table, the driving gear as pinion."""
+        if not self.reliefs:
+            return PLAIN
+        ends = self.line.meshes[mesh]
+        return PairModification(
+            pinion=self.reliefs[ends.driving], wheel=self.reliefs[ends.driven]
+        )
 
     def matrices(self, *, merge_rigid: bool = False) -> LineMatrices:
         """Mass, damping and stiffness, the meshes apart.
@@ -164,6 +177,7 @@ def read_drive_line(config: Configuration) -> DriveLine:
         motor_node=motor_node,
         load_node=load_node,
         support_forces=forces,
+        reliefs=tuple(relief_of(row) for row in gear_rows),
     )
 
 

@@ -155,12 +155,15 @@ def read_mesh_strength(
     mesh_section = config.section("mesh")
     # the mesh code knows gears by their sides, the tables by the names of the machine
     pair = named_by_side(line.drive.pairs[mesh])
+    modification = read_modification(config)
+    if not modification.is_any:
+        modification = line.drive.relief(mesh)
     flanks = SlicedPair(
         pair=pair,
         material=read_material(config),
         mesh=read_mesh_options(mesh_section),
         slices=read_slice_options(mesh_section),
-        modification=read_modification(config),
+        modification=modification,
         torque=0.0,
     )
     return RootStrength(

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from gensig.driveline.machine import LineMachine
 from gensig.driveline.running import named_by_side, reference_force
-from gensig.driveline.teeth import MeshHeat, is_tabulated, modified_there
+from gensig.driveline.teeth import MeshHeat, is_tabulated
 from gensig.errors import GensigError
 from gensig.geometry.contact import GearPair
 from gensig.mesh.thermal.heat import Heat
@@ -37,11 +37,7 @@ def hot_line(machine: LineMachine, heat: Heat) -> LineMachine:
             continue
         node = drive.numbers[drive.line.gears[mesh.driving].node]
         force = reference_force(engine, number, float(forces[number]))
-        law = machine.law
-        if number != machine.mesh_number:
-            cut = machine.modification
-            cut = modified_there(drive, machine.mesh_number, number, cut)
-            law = replace(law, modification=cut)
+        law = replace(machine.law, modification=machine.modified(number))
         duty = Duty(
             system=law.flanks(named_by_side(pairs[number]), force),
             heat=heat,

@@ -123,10 +123,7 @@ class LineMachine(Machine):
 
     @property
     def gears(self) -> dict[str, Gear]:
-        """All gears of the line.
-
-        Pinion and wheel of the followed mesh, the others as in the tables.
-        """
+        """All gears of the line: pinion and wheel of the followed mesh, others as in the tables."""
         return line_gears(self.engine.drive, self.mesh_number)
 
     @property
@@ -208,6 +205,11 @@ class LineMachine(Machine):
             self.engine, self.operating.speed / self.ratio, self.operating.torque
         )
 
+    def modified(self, number: int) -> PairModification:
+        """Flank modifications of a mesh."""
+        drive = self.engine.drive
+        return modified_there(drive, self.mesh_number, number, self.modification)
+
     @property
     def law(self) -> ToothLaw:
         """Material, conventions and slices of all teeth."""
@@ -215,7 +217,7 @@ class LineMachine(Machine):
             material=self.material,
             options=self.mesh,
             slices=self.slices,
-            modification=self.modification,
+            modification=self.modified(self.mesh_number),
             heat=self.heat,
         )
 
@@ -329,11 +331,7 @@ class LineMachine(Machine):
         """As ``Machine.at_gear``."""
         number = home_meshes(self.meshes)[gear]
         side = SIDES[self.meshes[number].gears.index(gear)]
-        drive, followed = self.engine.drive, self.mesh_number
-        cut = self.modification
-        if number != followed:
-            cut = modified_there(drive, followed, number, cut)
-        other = replace(self, mesh_number=number, modification=cut)
+        other = replace(self, mesh_number=number, modification=self.modified(number))
         speed = self.operating.speed * other.ratio / self.ratio
         return replace(other, operating=replace(self.operating, speed=speed)), side
 

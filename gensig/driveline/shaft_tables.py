@@ -34,7 +34,7 @@ GEAR_COLUMNS: dict[str, str | None] = {
     "node": "", "n_teeth": "", "normal_module": "mm", "pressure_angle": "deg",
     "helix_angle": "deg", "face_width": "mm", "mass": "kg", "profile_shift": "",
     "bore_radius": "mm", "addendum_coefficient": "", "clearance_coefficient": "",
-    "cutter_tip_radius_coefficient": "",
+    "cutter_tip_radius_coefficient": "", "tip_relief": "um", "tip_relief_height": "mm",
 }  # fmt: skip
 GEARS_NEEDED = (
     "node",

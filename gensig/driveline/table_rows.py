@@ -22,6 +22,7 @@ from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.iso6336 import mesh_stiffness
+from gensig.mesh.modification import FlankModification
 
 MOST_NODES_TOLD = 12  # in a message
 RATIO_TOLERANCE = 1e-3  # relative, of a speed ratio that a table gives beside its teeth
@@ -130,6 +131,17 @@ def gear_of(row: TableRow) -> Gear:
         )
     except GensigError as error:
         raise row.error(error, f"{row.location()}: {error}") from None
+
+
+def relief_of(row: TableRow) -> FlankModification:
+    """Tip relief of both flanks of one gear; none where its cells are empty."""
+    try:
+        return FlankModification(
+            tip_relief=row.not_negative("tip_relief", 0.0),
+            tip_relief_height=row.not_negative("tip_relief_height", 0.0),
+        )
+    except GensigError as error:
+        raise ConfigError(f"{row.location('tip_relief')}: {error}") from None
 
 
 def line_gear(

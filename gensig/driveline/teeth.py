@@ -27,7 +27,6 @@ from gensig.material import Material
 from gensig.mesh.load_distribution import loaded_pair_table
 from gensig.mesh.modification import (
     PLAIN,
-    FlankModification,
     PairModification,
     sound_teeth,
 )
@@ -308,13 +307,19 @@ def felt_there(
 def modified_there(
     drive: DriveLine, followed: int, number: int, modification: PairModification
 ) -> PairModification:
-    """The modification of the followed mesh as another mesh meets it.
+    """The modification of a mesh: the given one of the followed mesh as this mesh meets it.
 
     Pinion and wheel have it on the flanks that work in the followed mesh, so also where the pinion
-    drives and where the wheel is driven. The misalignment is of the mounting of the two.
+    drives and where the wheel is driven. The misalignment is of the mounting of the two. Elsewhere,
+    and where none is given, gears have the tip relief of the table.
     """
+    by_table = drive.relief(number)
+    if not modification.is_any:
+        return by_table
+    if number == followed:
+        return modification
     here = zip(_ends(drive, followed), _ends(drive, number), SIDES, strict=True)
-    flanks = dict.fromkeys(SIDES, FlankModification())
+    flanks = by_table.sides
     for gear, there, side in here:
         if gear == there:
             flanks[side] = modification.sides[side]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,6 +20,11 @@ VELOCITY = "velocity_rms"
 BAND = (10.0, 1000.0)  # Hz, of broad-band velocity in ISO 20816-1 and -3
 # m/s, zone boundary C/D of ISO 20816-3 for large machines on flexible supports
 HARMFUL_VELOCITY = 11.0e-3
+# upper ends of zones A, B and C of ISO 20816-3 on rigid foundations, mm/s, by power up to kW:
+# group 2, then group 1; from memory
+ZONES = "ABCD"
+ZONE_LIMITS = {300.0: (1.4, 2.8, 4.5), float("inf"): (2.3, 4.5, 7.1)}
+LEAST_POWER = 15.0  # kW, from which the standard applies
 # assumed: published housings of sound gears stay below
 LOUD_ACCELERATION = 10.0 * STANDARD_GRAVITY
 
@@ -35,6 +41,27 @@ def velocity_rms(signal: FloatArray, sampling_rate: float) -> FloatArray:
     held = (frequency >= BAND[0]) & (frequency <= BAND[1])
     power = density[..., held] / (2.0 * np.pi * frequency[held]) ** 2
     return np.asarray(np.sqrt(power.sum(axis=-1) * frequency[1]))
+
+
+def vibration_zone(velocity: float, power_kw: float) -> str:
+    """Zone of ISO 20816-3, A to D, of a velocity RMS in m/s on a rigid foundation."""
+    return ZONES[bisect.bisect_left(_limits(power_kw), 1e3 * velocity)]
+
+
+def zone_limits(power_kw: float) -> str:
+    """The limits of the zones in words."""
+    limits = [
+        f"{zone} to {limit:g}"
+        for zone, limit in zip(ZONES, _limits(power_kw), strict=False)
+    ]
+    text = f"rigid foundation: {', '.join(limits)} mm/s"
+    if power_kw < LEAST_POWER:
+        text += f"; the standard is for {LEAST_POWER:g} kW and more"
+    return text
+
+
+def _limits(power_kw: float) -> tuple[float, ...]:
+    return next(limits for power, limits in ZONE_LIMITS.items() if power_kw <= power)
 
 
 def level_table(

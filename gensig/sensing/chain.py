@@ -54,9 +54,10 @@ class Sensing:
     ``channels`` are the simulated accelerations; a key of ``IN_PLACE`` alone stands for such
     of every gear until the machine is known (``of_machine``). Without a ``path`` the sensors feel
     these; a path leads from them to the ``sensors``. ``snr`` in dB; None records without noise,
-    or with noise of a level that ``noise`` sets. Its reference is the power of the same unit at the same condition without the fault
-    (``healthy_twin``), so the floor does not reveal the class. None for ``sensor`` is an ideal
-    one, None for ``noise`` is white noise over the whole band. ``nuisances`` shake the bearings
+    or with noise of a level that ``noise`` sets. Its reference is the power of the same unit at
+    the same condition without the fault (``healthy_twin``), so the floor does not reveal the
+    class. None for ``sensor`` is an ideal one, None for ``noise`` is white noise over the whole
+    band. ``nuisances`` shake the bearings
     of every class.
     """
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gensig.commands.new.data_sheet import GearOption, check_positive
+from gensig.commands.new.tip_relief import tip_reliefs
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
@@ -96,7 +97,10 @@ def experiment_text(option: GearOption, wishes: Wishes) -> str:
         defaults.append(f"  - {REALISTIC}")
     if option.is_helical:
         defaults.append("  - override /system: helical_pair")
-    lines += ["defaults:", *defaults, f"  - override /gear: {name}", "  - _self_", ""]
+    lines += ["defaults:", *defaults, f"  - override /gear: {name}"]
+    if tip_reliefs(option):
+        lines.append(f"  - override /modification: {name}")
+    lines += ["  - _self_", ""]
     lines += operating_lines(option, wishes)
     if wishes.grade is not None:
         lines += quality_lines(wishes, wishes.grade)

@@ -13,6 +13,7 @@ from typing import Any
 from gensig.commands.new.data_sheet import DataSheet, gear_option
 from gensig.commands.new.doubts import all_doubts
 from gensig.commands.new.experiment import experiment_text, read_wishes
+from gensig.commands.new.healthy_level import read_level
 from gensig.commands.new.option_files import (
     check_name,
     check_texts,
@@ -20,9 +21,10 @@ from gensig.commands.new.option_files import (
     write_all,
 )
 from gensig.commands.new.staged_gearbox import new_staged, read_staged_sheet
+from gensig.commands.new.tip_relief import modification_text
 from gensig.errors import ConfigError
 
-GROUPS = ("gear", "experiment")
+GROUPS = ("gear", "modification", "experiment")
 N_TEETH = (2, 4, 6)  # two gears a stage
 
 # attribute, question, numbers of values; those that are needed come first
@@ -56,25 +58,34 @@ def new(arguments: Namespace) -> int:
         )
     if len(arguments.teeth) > 2:
         return new_staged(read_staged_sheet(arguments), arguments)
-    check_name(name, ["gear"], [files["gear"]])
+    of_gears = GROUPS[:2]
+    check_name(name, of_gears, [files[group] for group in of_gears])
     wishes = read_wishes(arguments)
     option = gear_option(_sheet(arguments))
-    texts = {"gear": option.text(), "experiment": experiment_text(option, wishes)}
+    texts = {
+        "gear": option.text(),
+        "modification": modification_text(option),
+        "experiment": experiment_text(option, wishes),
+    }
+    texts = {group: text for group, text in texts.items() if text}
     check_texts(name, texts)
     for message in all_doubts([option]):
         warnings.warn(message, stacklevel=2)
-    write_all({file: texts[group] for group, file in files.items()})
+    write_all({files[group]: text for group, text in texts.items()})
     content: dict[str, Any] = {
-        "files": [str(file) for file in files.values()],
+        "files": [str(files[group]) for group in texts],
         "derived": option.derived(),
         "bearings": option.bearings(),
         "next": next_commands(folder, name),
     }
+    level = read_level(arguments, folder)
+    if level is not None:
+        content["healthy_level"] = level.content()
     if arguments.json:
         print(json.dumps(content))
         return 0
-    names = " and ".join(content["files"])
-    print(f"wrote {names}; each line there says where it is from")
+    *first, last = content["files"]
+    print(f"wrote {', '.join(first)} and {last}; each line there says where it is from")
     print("with the gears as given it follows:")
     for key, value in content["derived"].items():
         text = "-"
@@ -83,6 +94,8 @@ def new(arguments: Namespace) -> int:
         print(f"  {key:<32}{text}")
     for side, bearing in content["bearings"].items():
         print(f"  {side + '_bearings':<32}{bearing}")
+    if level is not None:
+        print(*level.lines(), sep="\n")
     print("next:", *content["next"], sep="\n  ")
     return 0
 

@@ -14,6 +14,7 @@ from typing import TypeAlias
 from gensig.commands.new.data_sheet import GearOption
 from gensig.commands.new.experiment import ScaledRotor, scaled_rotor, short_text
 from gensig.commands.new.stages import StagedSheet, shaft_diameters
+from gensig.commands.new.tip_relief import RELIEF_ORIGIN, tip_reliefs
 from gensig.geometry.contact import SIDES
 from gensig.systems.derived_sizes import BORE_SHARE, WIDTH_IN_MODULES
 
@@ -53,6 +54,8 @@ GEARS = (
     "addendum_coefficient",
     "clearance_coefficient",
     "cutter_tip_radius_coefficient",
+    "tip_relief_um",
+    "tip_relief_height_mm",
 )
 
 
@@ -108,11 +111,14 @@ def gears_table(sheet: StagedSheet, stages: Sequence[GearOption]) -> str:
         "stages has the smaller bore of both. Masses are those of steel discs; a column mass_kg "
         "replaces them.",
     ]
+    reliefs = [tip_reliefs(option) for option in stages]
+    if any(reliefs):
+        head.append(f"Tip reliefs: {RELIEF_ORIGIN}.")
     nodes = LineNodes(n_stages=sheet.n_stages)
     rows: list[Row] = []
-    for mesh, option in zip(nodes.meshes, stages, strict=True):
+    for mesh, option, relief in zip(nodes.meshes, stages, reliefs, strict=True):
         for node, side in zip(mesh, SIDES, strict=True):
-            values = option.gear | option.gear[side]
+            values = option.gear | option.gear[side] | relief.get(side, {})
             row = {key: values[key] for key in GEARS if key in values}
             rows.append({**row, "node": node, "name": nodes.gear(node)})
     return _table(head, GEARS, rows)

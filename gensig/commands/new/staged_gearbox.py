@@ -13,6 +13,7 @@ from typing import Any
 from gensig.commands.new.data_sheet import GearOption
 from gensig.commands.new.doubts import all_doubts
 from gensig.commands.new.experiment import read_wishes
+from gensig.commands.new.healthy_level import read_level
 from gensig.commands.new.line_option import staged_experiment_text, system_text
 from gensig.commands.new.line_tables import gears_table, shafting_table
 from gensig.commands.new.option_files import (
@@ -144,10 +145,16 @@ def new_staged(sheet: StagedSheet, arguments: Namespace) -> int:
         "shafts": shaft_values(sheet),
         "next": next_commands(folder, name),
     }
+    level = read_level(arguments, folder)
+    if level is not None:
+        content["healthy_level"] = level.content()
     if arguments.json:
         print(json.dumps(content))
         return 0
     _print(content)
+    if level is not None:
+        print(*level.lines(), sep="\n")
+    print("next:", *content["next"], sep="\n  ")
     return 0
 
 
@@ -211,4 +218,3 @@ def _print(content: dict[str, Any]) -> None:
             f"{shaft['diameter_mm']:g} mm at {shaft['torsional_stress_mpa']:.3g} MPa"
         )
         print(f"  {f'shaft {number}':<32}{numbers}, {shaft['bearing']}")
-    print("next:", *content["next"], sep="\n  ")

@@ -1,11 +1,13 @@
 """Flank modifications of a drive line: those of a pair, on the flanks that work in its mesh."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from gensig import configs
 from gensig.driveline.teeth import modified_there
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.modification import FlankModification
@@ -15,6 +17,7 @@ from gensig.record.machines import read_machine
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.spur_pair import SpurPair
 
+TABLES = Path(configs.__file__).parent / "tables"
 SHORT = ("operating.duration_s=0.02", "mesh.points_per_pitch=64", "mesh.n_slices=6")
 RELIEF = (
     "modification.pinion.tip_relief_um=12",
@@ -118,3 +121,56 @@ def test_other_meshes_meet_the_same_flanks_or_others(followed, other, pinion, wh
     assert there.wheel == (machine.modification.wheel if wheel else plain)
     assert there.misalignment == 0.0
     assert machine.modification.misalignment == pytest.approx(10e-6)
+
+
+@pytest.fixture
+def relieved_by_table(tmp_path):
+    """The two-stage gearbox with tip reliefs in its table of gears; overrides follow."""
+    shipped = (TABLES / "two_stage_gears.csv").read_text(encoding="utf-8")
+    rows = [text for text in shipped.splitlines() if not text.startswith("#")]
+    lines = [f"{rows[0]},tip_relief_um,tip_relief_height_mm"]
+    for number, row in enumerate(rows[1:], start=1):
+        lines.append(f"{row},{3 * number},1.{number}")
+    file = tmp_path / "gears.csv"
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    def make(*words):
+        return line("system=two_stage_gearbox", f"system.gears_csv={file}", *words)
+
+    return make
+
+
+def test_reliefs_of_the_table_are_those_of_an_option(relieved_by_table):
+    """In the followed mesh the same tables as the same reliefs of the group."""
+    words = [
+        "modification.pinion.tip_relief_um=3",
+        "modification.pinion.tip_relief_height_mm=1.1",
+        "modification.wheel.tip_relief_um=6",
+        "modification.wheel.tip_relief_height_mm=1.2",
+    ]
+    by_option = line("system=two_stage_gearbox", *words)
+    by_table = relieved_by_table()
+    assert_same_tables(by_table.mesh_table(), by_option.mesh_table())
+    assert by_table.modified(0) == by_option.modified(0)
+
+
+def test_every_mesh_has_the_reliefs_of_its_gears(relieved_by_table):
+    machine = relieved_by_table()
+    depths = [
+        [side.tip_relief for side in machine.modified(number).sides.values()]
+        for number in range(2)
+    ]
+    assert_allclose(depths, [[3e-6, 6e-6], [9e-6, 12e-6]])
+    # seen from a gear of the other mesh too
+    other, _ = machine.at_gear("output_gear")
+    assert other.mesh_number == 1
+    for number in range(2):
+        assert other.modified(number) == machine.modified(number)
+
+
+def test_an_option_stands_for_the_table_in_the_followed_mesh_only(relieved_by_table):
+    machine = relieved_by_table("modification.pinion.crowning_um=4")
+    followed, other = machine.modified(0), machine.modified(1)
+    assert followed.pinion == FlankModification(crowning=4e-6)
+    assert followed.wheel == FlankModification()
+    assert other.pinion.tip_relief == pytest.approx(9e-6)

@@ -7,6 +7,7 @@ import re
 import shlex
 import sys
 
+import numpy as np
 import pytest
 import yaml
 from docs_pages import ROOT, blocks, command_lines
@@ -15,12 +16,13 @@ from numpy.testing import assert_allclose
 from gensig.cli import main
 from gensig.commands.new.data_sheet import DataSheet, gear_option, least_backlash
 from gensig.plan.request import read_request
+from gensig.production.streaming import open_stream
 from gensig.systems.root_strength import read_root_strength
 from gensig.text.option_writing import is_option_name
 
 SIDES = ("pinion", "wheel")
 SHEET = "--teeth 20 45 --module 3 --speed 1500 --torque 60"
-NEW = f"new gearbox mine {SHEET} --dir ."
+NEW = f"new gearbox mine {SHEET} --dir . --no-level"
 
 
 def option(**changes):
@@ -168,6 +170,61 @@ def test_the_printed_commands_work_as_printed(more, gensig, tmp_path):
     gensig("verify runs/mine")
 
 
+def test_tips_are_relieved_for_the_rated_torque(gensig, tmp_path):
+    gensig(NEW)
+    written = yaml.safe_load((tmp_path / "modification" / "mine.yaml").read_text())
+    machine = option().machine
+    relief = machine.long_relief()
+    for side in SIDES:
+        cut = relief.sides[side]
+        assert written[side]["tip_relief_um"] == round(1e6 * cut.tip_relief, 2)
+        height = 1e3 * cut.tip_relief_height
+        assert written[side]["tip_relief_height_mm"] == round(height, 3)
+    config = read_request(["experiment=mine"], config_dir=tmp_path).config
+    used = config["modification"]["pinion"]["tip_relief_um"]
+    assert used == written["pinion"]["tip_relief_um"] > 2.0
+
+
+def test_helical_teeth_get_no_relief(gensig, tmp_path):
+    gensig(f"{NEW} --helix 20")
+    assert not (tmp_path / "modification").exists()
+    config = read_request(["experiment=mine"], config_dir=tmp_path).config
+    assert config["modification"]["pinion"]["tip_relief_um"] == 0
+
+
+def test_the_level_is_that_of_the_records_that_follow(gensig, tmp_path):
+    said, _ = gensig(f"new gearbox mine {SHEET} --dir . --json")
+    level = json.loads(said)["healthy_level"]
+    assert (level["at"], level["machines"]) == ("bearings", 8)
+    assert level["iso_20816_3_zone"] is None
+    stream = open_stream(
+        read_request(
+            [
+                "experiment=mine",
+                "plan.classes=[healthy]",
+                "plan.n_records=8",
+                "plan.n_units=8",
+                "plan.n_gearboxes=8",
+                "operating.speed_rpm=1500",
+                "operating.torque_nm=60",
+                "operating.duration_s=0.5",
+                "sensing.snr_db=null",
+            ],
+            config_dir=tmp_path,
+        ).config
+    )
+    rms = [record.signals["acceleration"].std(axis=1) for record in stream]
+    expected = np.median(rms, axis=0) / 9.80665
+    assert_allclose(list(level["rms_g"].values()), expected, rtol=1e-4)
+
+
+def test_a_machine_without_records_has_no_level(gensig, tmp_path):
+    low = "--teeth 38 55 --addendum 0.5"
+    _, told = gensig(f"new gearbox mine {SHEET} {low} --dir .")
+    assert "no healthy level: the transverse contact ratio" in told
+    assert (tmp_path / "gear" / "mine.yaml").exists()
+
+
 def test_on_a_terminal_it_asks(gensig, tmp_path, monkeypatch):
     answers = itertools.chain(
         ["20", "20, 45", "3", "1500", "60"],  # the first is one number too few
@@ -176,7 +233,7 @@ def test_on_a_terminal_it_asks(gensig, tmp_path, monkeypatch):
     monkeypatch.setattr("builtins.input", lambda question: next(answers))
     terminal = type("Terminal", (), {"isatty": lambda self: True})
     monkeypatch.setattr(sys, "stdin", terminal())
-    gensig("new gearbox mine --dir .")
+    gensig("new gearbox mine --dir . --no-level")
     gear = yaml.safe_load((tmp_path / "gear" / "mine.yaml").read_text())
     assert [gear[side]["face_width_mm"] for side in SIDES] == [30.0, 28.0]
     assert gear["rated_torque_nm"] == 60.0

@@ -26,7 +26,7 @@ from gensig.plan.request import read_request
 from gensig.systems.derived_sizes import bores
 
 SHEET = "--teeth 29 100 36 90 --module 1.5 2 --speed 1500 --torque 10"
-NEW = f"new gearbox mine {SHEET} --dir ."
+NEW = f"new gearbox mine {SHEET} --dir . --no-level"
 
 
 def sheet(**changes):
@@ -85,7 +85,7 @@ def test_a_shaft_of_steel_is_as_stiff_as_the_textbook_says():
     ],
 )
 def test_the_tables_close_and_carry_the_given_torque(words, names, gensig, tmp_path):
-    said, _ = gensig(f"new gearbox mine {words} --dir . --json")
+    said, _ = gensig(f"new gearbox mine {words} --dir . --json --no-level")
     told = json.loads(said)
     config = read_request(["experiment=mine"], config_dir=tmp_path).config
     machine = read_line_machine(config)
@@ -161,7 +161,7 @@ def test_records_are_of_all_gears_and_of_the_two_evaluation_method(
     words, gensig, tmp_path
 ):
     """Every gear has a channel, faults are on any gear, and steps are checked."""
-    gensig(f"new gearbox mine {words} --dir . --json")
+    gensig(f"new gearbox mine {words} --dir . --json --no-level")
     few = (
         "plan.n_records=6 plan.n_units=3 operating.duration_s=0.1 executor.n_workers=1"
     )
@@ -247,7 +247,7 @@ def test_on_a_terminal_it_asks_for_stages(gensig, tmp_path, monkeypatch):
     monkeypatch.setattr("builtins.input", lambda question: next(answers))
     terminal = type("Terminal", (), {"isatty": lambda self: True})
     monkeypatch.setattr(sys, "stdin", terminal())
-    gensig("new gearbox mine --dir .")
+    gensig("new gearbox mine --dir . --no-level")
     assert (tmp_path / "tables" / "mine_gears.csv").exists()
     assert list(answers) == []
 
