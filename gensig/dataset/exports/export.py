@@ -22,14 +22,17 @@ from gensig.dataset.exports.export_tables import (
     write_npz,
 )
 from gensig.dataset.exports.split_columns import (
+    EVERY_CLEAN,
     Stretches,
     clean_protocols,
     hardest_protocol,
+    is_clean,
     read_protocols,
     split_columns,
 )
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.dataset.schema import known_column
+from gensig.dataset.splitting.protocols import MACHINE_COLUMNS
 from gensig.dataset.storage.atomic import (
     publish,
     sync_file,
@@ -70,7 +73,8 @@ def export(
     samples : bool          parquet: time signals too, not only the labels
     one_channel : bool      wav: one file a record and channel, instead of one a record
     protocols : sequence    splits to export, 'all' stands for every one that keeps units apart;
-                            None: for hf the hardest of them, otherwise all of them
+                            None: for hf the first of them, `new_machine` or otherwise `by_unit`,
+                            for other formats all of them
 
     Returns
     -------
@@ -123,9 +127,13 @@ def _read_splits(
         if protocols is None:
             protocols = clean_protocols(data)
         return read_protocols(data, protocols)
-    if protocols is None:
+    if not protocols:
         protocols = [hardest_protocol(data)]
-    splits = read_protocols(data, protocols)
+    # The first is the default of the folder, which no leaky one should be.
+    in_order = sorted(
+        protocols, key=lambda name: name != EVERY_CLEAN and not is_clean(name)
+    )
+    splits = read_protocols(data, in_order)
     if not splits:
         hardest_protocol(data)  # raises with the reason
     return {name: rows.take(data.usable[rows.record]) for name, rows in splits.items()}
@@ -226,13 +234,16 @@ def _check_pyarrow(to: str) -> None:
 def _check_ids(data: Dataset) -> None:
     """Raise DatasetError for rows that are not those of the plan.
 
-    Ids become file names, and only the ids of the plan were checked.
+    Ids of records become file names, and splits keep apart the units of the plan.
     """
-    if not np.array_equal(data.column("record_id"), data.plan.columns["record_id"]):
-        raise DatasetError(
-            f"{data.folder}: shards and plan have different record ids; run `gensig verify "
-            f"{data.folder}`"
-        )
+    planned = data.plan.columns
+    for name in ("record_id", *MACHINE_COLUMNS):
+        if name in planned and not np.array_equal(data.column(name), planned[name]):
+            kind = name.removesuffix("_id")
+            raise DatasetError(
+                f"{data.folder}: shards and plan have different {kind} ids; run `gensig verify "
+                f"{data.folder}`"
+            )
 
 
 def _check_space(out: Path, n_bytes: int) -> None:

@@ -37,12 +37,15 @@ the files of one protocol
 only: together with those of another, training has the units of its test.
 """
 
-LEAKY = """**`{protocol}` leaks.** {reason} A score on it says nothing of a machine that was not \
-trained on. Never
-report it without a clean split beside it.
+LEAKY = """**`{protocol}` leaks.** Windows of the same record are in every subset, on purpose. A \
+score on it says
+nothing of a machine that was not trained on. Never report it without a clean split beside it.
 """
-SAME_RECORDS = "Windows of the same record are in every subset, on purpose."
-UNKNOWN = "This version of gensig does not know which units it keeps apart."
+
+UNCHECKED = """**`{protocol}` is unchecked.** The version of gensig that wrote this folder does \
+not know which units
+it keeps apart.
+"""
 
 STRETCHES = """Rows of `{protocol}` are stretches of records: the signals from `start_sample` to \
 before `stop_sample`, in
@@ -189,6 +192,8 @@ def _split_row(config: HubConfig) -> tuple[object, ...]:
     if is_clean(config.protocol):
         names = ("record_id", *PROTOCOLS[config.protocol].apart)
         apart = ", ".join(names)
+    elif config.protocol not in PROTOCOLS:
+        apart = "unknown"
     rows = []
     for subset in SUBSETS:
         files = config.subsets.get(subset)
@@ -197,12 +202,12 @@ def _split_row(config: HubConfig) -> tuple[object, ...]:
 
 
 def _warnings(config: HubConfig) -> str:
-    """Paragraphs on a protocol that leaks or cuts records; '' for any other."""
+    """Paragraphs on a protocol that leaks, is unknown or cuts records; '' for any other."""
     words = ""
-    if not is_clean(config.protocol):
-        known = config.protocol in PROTOCOLS
-        reason = SAME_RECORDS if known else UNKNOWN
-        words += LEAKY.format(protocol=config.protocol, reason=reason)
+    if config.protocol not in PROTOCOLS:
+        words += UNCHECKED.format(protocol=config.protocol)
+    elif not is_clean(config.protocol):
+        words += LEAKY.format(protocol=config.protocol)
     if config.cut:
         words += "\n" + STRETCHES.format(protocol=config.protocol)
     return words

@@ -1,15 +1,18 @@
 """`datasets.load_dataset` opens an export: splits apart, class names, text, signals to the bit."""
 
+import json
 import re
 import sys
 from types import SimpleNamespace
 
 import datasets
+import h5py
 import numpy as np
 import pytest
 import yaml
 from dataset_samples import build
 from numpy.testing import assert_array_equal
+from pyarrow import parquet
 from split_samples import CLASSES, FAILED, LEAKY, REFERENCES, every_protocol_plan
 
 import gensig.dataset.exports.export as export_module
@@ -160,6 +163,9 @@ def test_the_hardest_protocol_alone_unless_asked(stored, tmp_path):
     assert one == ["new_machine"]
     assert sorted(every) == sorted(CLEAN)
     assert two == ["cross_speed", "by_unit"]
+    export(stored, "hf", tmp_path / "last", protocols=[LEAKY, "by_unit"])
+    last = datasets.load_dataset(str(tmp_path / "last"))
+    assert "start_sample" not in last["train"].column_names
     for folder, config in (("one", "new_machine"), ("two", "cross_speed")):
         default = datasets.load_dataset(str(tmp_path / folder))
         named = datasets.load_dataset(str(tmp_path / folder), config)
@@ -207,14 +213,38 @@ def test_card_states_sizes_and_warns_of_the_leak(hub):
         files = list(folder.glob("*.parquet"))
         assert entry["download_size"] == sum(path.stat().st_size for path in files)
         sizes = {split["name"]: split["num_examples"] for split in entry["splits"]}
-        loaded = datasets.load_dataset(str(hub), entry["config_name"])
-        assert sizes == {subset: len(part) for subset, part in loaded.items()}
+        rows = {
+            subset: sum(
+                parquet.read_metadata(path).num_rows
+                for path in folder.glob(f"{subset}-*")
+            )
+            for subset in SUBSETS
+        }
+        assert sizes == rows
         cells = " | ".join(map(str, sizes.values()))
         name = entry["config_name"].replace("_", r"\_")
         assert re.search(rf"^\| {re.escape(name)} \| [^|]+ \| {cells} \|", text, re.M)
     assert f"`{LEAKY}` leaks" in text
     assert "Failed records are left out everywhere: 1." in text
     assert "| speed\\_rpm | r/min | result |" in text
+
+
+def test_a_protocol_of_a_later_version_is_exported_by_its_name_only(tmp_path):
+    """Which units it keeps apart is not known here, and the card says so."""
+    folder = build(tmp_path / "set", every_protocol_plan(), references=True)
+    text = (folder / "splits" / "by_unit.csv").read_text()
+    (folder / "splits" / "by_moon.csv").write_text(text)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["files"]["splits/by_moon.csv"] = "0" * 64
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    export(folder, "npz", tmp_path / "x.npz")
+    with np.load(tmp_path / "x.npz") as arrays:
+        assert "split/by_unit" in arrays
+        assert "split/by_moon" not in arrays
+    export(folder, "hf", tmp_path / "hub", protocols=["by_moon"])
+    card = (tmp_path / "hub" / "README.md").read_text(encoding="utf-8")
+    assert "`by_moon` is unchecked" in card
+    assert "leaks" not in card
 
 
 @pytest.mark.parametrize("to", FORMATS)
@@ -224,6 +254,17 @@ def test_a_split_with_a_unit_on_two_sides_is_refused(poisoned, tmp_path, to):
         export(poisoned, to, out, protocols=["by_unit"])
     assert not out.exists()
     export(poisoned, to, out, protocols=["cross_gearbox"])  # its file is untouched
+
+
+@pytest.mark.parametrize("column", ["unit_id", "specimen_id", "gearbox_id"])
+def test_a_shard_with_another_machine_than_the_plan_is_refused(tmp_path, column):
+    """The check of a split looks at the plan; what is loaded comes from the shards."""
+    folder = build(tmp_path / "set", every_protocol_plan(), references=True)
+    with h5py.File(shard_path(folder, 2), "r+") as file:
+        file[column][3] = b"u5"
+    kind = column.removesuffix("_id")
+    with pytest.raises(DatasetError, match=f"plan have different {kind} ids"):
+        export(folder, "hf", tmp_path / "hub")
 
 
 @pytest.mark.parametrize(
