@@ -248,15 +248,24 @@ SET_VERBS = {
         ),
     ),
     "export": Verb(
-        summary="a data set as one HDF5 file, Parquet, npz or wav",
+        summary="a data set as one HDF5 file, Parquet, npz, wav or for Hugging Face, with splits",
         examples=(
             "gensig export runs/quickstart --to parquet --out quickstart.parquet",
+            "gensig export runs/quickstart --to hf --protocol by_unit --out quickstart_hf",
         ),
         runs="gensig.commands.sets.export:export",
         arguments=(
             text("folder", "DIR", "folder of a complete data set; it is left alone"),
-            text("--to", "FORMAT", "hdf5, parquet, npz or wav", required=True),
-            required_out("PATH", "file (wav: folder) that does not exist yet"),
+            text("--to", "FORMAT", "hdf5, parquet, npz, wav or hf", required=True),
+            required_out("PATH", "file (wav, hf: folder) that does not exist yet"),
+            text(
+                "--protocol",
+                "NAME",
+                "split to export, may be repeated; 'all': every one that keeps units apart "
+                "(default: all, hf: the first of new_machine, by_unit, ...); "
+                "random_window_leaky only by its name",
+                action="append",
+            ),
             switch("--samples", help="parquet: time signals too, not only the labels"),
             switch("--one-channel", help="wav: one file a channel, not one a record"),
         ),

@@ -21,7 +21,7 @@ from gensig.dataset.plan import Plan, read_plan
 from gensig.dataset.schema import SCALES, bulk_signals, signal_column
 from gensig.dataset.selection import Selection, StoredRecord, structured, unknown_name
 from gensig.dataset.splitting.protocols import NEW_MACHINE, PROTOCOLS, why_left_out
-from gensig.dataset.splitting.splits import SUBSETS, read_split
+from gensig.dataset.splitting.splits import SUBSETS, SplitTable, read_split
 from gensig.dataset.storage.attributes import HDF5_ERRORS, read_attributes
 from gensig.dataset.storage.compression import compression_of
 from gensig.dataset.storage.guard import (
@@ -333,24 +333,34 @@ class Dataset:
         made_by = f"gensig {self.manifest.generator_version}, which made the set, did not know it"
         return {name: reasons.get(name, made_by) for name in absent}
 
+    def split_table(self, protocol: str) -> SplitTable:
+        """Table of a split as its file holds it, rows by `record_id`.
+
+        Raises
+        ------
+        DatasetError    for a protocol that the set lacks, with the reason or the nearest name,
+                        and for a file that is no split table
+        """
+        if protocol in self.protocols:
+            return read_split(self.folder / SPLITS / f"{protocol}.csv")
+        if protocol in PROTOCOLS:
+            raise DatasetError(
+                f"split {protocol!r} does not exist in {self.folder}; {self.left_out[protocol]}"
+            )
+        raise unknown_name("split", protocol, self.protocols, self.folder)
+
     def split(self, protocol: str) -> SplitRows:
         """subset -> list of (record_index, start_fraction, stop_fraction).
 
         Failed records are in it, see `usable`.
         """
-        if protocol not in self.protocols:
-            if protocol in PROTOCOLS:
-                raise DatasetError(
-                    f"split {protocol!r} does not exist in {self.folder}; {self.left_out[protocol]}"
-                )
-            raise unknown_name("split", protocol, self.protocols, self.folder)
-        path = self.folder / SPLITS / f"{protocol}.csv"
-        table = read_split(path)
+        table = self.split_table(protocol)
         ids = self.plan.columns["record_id"].tolist()
         index = {record_id: i for i, record_id in enumerate(ids)}
         rows: SplitRows = {subset: [] for subset in SUBSETS}
         for record_id, start, stop, subset in table.rows():
             if record_id not in index:
+                path = self.folder / SPLITS / f"{protocol}.csv"
                 raise DatasetError(
                     f"{path} names record {record_id[:40]!r}, which the plan has not; restore it "
                     "from a copy"

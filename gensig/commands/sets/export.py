@@ -5,23 +5,29 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
+from gensig.dataset.exports.export import HUGGING_FACE
 from gensig.dataset.exports.export import export as export_folder
 from gensig.report.document import write_report
 
 
 def export(arguments: Namespace) -> int:
     """Write a data set in another format; the data set itself is left alone."""
+    out = Path(arguments.out).expanduser()
     made = export_folder(
         Path(arguments.folder),
         arguments.to,
-        Path(arguments.out).expanduser(),
+        out,
         samples=arguments.samples,
         one_channel=arguments.one_channel,
+        protocols=arguments.protocol,
     )
     print(
         f"{arguments.out}: {made['records']} records as {arguments.to}, "
         f"{made['files']} file(s), {made['bytes']} bytes"
     )
+    if arguments.to == HUGGING_FACE:
+        for folder in sorted((out / "data").iterdir()):
+            print(f"datasets.load_dataset({str(out)!r}, {folder.name!r})")
     return 0
 
 

@@ -88,12 +88,12 @@ def card_text(data: Dataset, pictures: Mapping[str, str] | None = None) -> str:
         front_matter(data),
         f"# {escape(data.folder.resolve().name)}",
         f"Gear vibration, simulated and labelled by gensig {version}.",
-        _table(("fact", "value"), _facts(data)),
+        table(("fact", "value"), set_facts(data)),
         "## Classes",
-        _table(("class", "records", "severity"), _classes(data)),
+        table(("class", "records", "severity"), class_rows(data)),
         _gallery(pictures or {}),
         "## Splits",
-        _table(("protocol", *SUBSETS), _splits(data)),
+        table(("protocol", *SUBSETS), _splits(data)),
         "## Load it",
         LOAD,
         "## Caveats",
@@ -117,22 +117,32 @@ def _gallery(pictures: Mapping[str, str]) -> str:
 
 def front_matter(data: Dataset) -> str:
     """YAML for the Hugging Face hub and `load_dataset`: licence, tags, size, record files."""
-    sizes = [name for limit, name in SIZES if data.n_records < limit]
+    configs = [
+        {
+            "config_name": "default",
+            "data_files": [{"split": "train", "path": f"{SHARDS}/*.h5"}],
+        }
+    ]
+    return yaml_block({**hub_facts(data, data.n_records), "configs": configs})
+
+
+def hub_facts(data: Dataset, n_rows: int) -> dict[str, object]:
+    """Name, licence, task, tags and size of ``n_rows`` rows, by the keys of the hub."""
+    sizes = [name for limit, name in SIZES if n_rows < limit]
     size = (*sizes, "n>10M")[0]
-    content = {
+    return {
         "pretty_name": plain(data.folder.resolve().name),
         "license": "cc-by-4.0",
         "task_categories": ["tabular-classification"],
         "tags": [*TAGS, f"gensig-{plain(data.manifest.generator_version)}"],
         "size_categories": [size],
-        "configs": [
-            {
-                "config_name": "default",
-                "data_files": [{"split": "train", "path": f"{SHARDS}/*.h5"}],
-            }
-        ],
     }
-    return f"---\n{yaml.safe_dump(content, sort_keys=False, allow_unicode=True)}---"
+
+
+def yaml_block(content: Mapping[str, object]) -> str:
+    """Front matter of a Markdown page."""
+    text = yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True)
+    return f"---\n{text}---"
 
 
 def plain(value: object) -> str:
@@ -145,13 +155,15 @@ def escape(value: object) -> str:
     return re.sub(r"([\\`*_\[\]|#~!])", r"\\\1", html.escape(plain(value), quote=False))
 
 
-def _table(header: tuple[str, ...], rows: list[tuple[object, ...]]) -> str:
+def table(header: tuple[str, ...], rows: list[tuple[object, ...]]) -> str:
+    """Markdown table with every cell escaped."""
     lines = [" | ".join(header), " | ".join("---" for _ in header)]
     lines += [" | ".join(escape(cell) for cell in row) for row in rows]
     return "\n".join(f"| {line} |" for line in lines)
 
 
-def _facts(data: Dataset) -> list[tuple[object, ...]]:
+def set_facts(data: Dataset) -> list[tuple[object, ...]]:
+    """Rows of fact and value on all records of a data set."""
     units = data.attributes.get("channel_units", ["m/s^2"] * len(data.channel_names))
     pairs = zip(data.channel_names, units, strict=False)
     n_reference = int(np.count_nonzero(data.is_reference))
@@ -190,7 +202,8 @@ def _facts(data: Dataset) -> list[tuple[object, ...]]:
     return list(facts.items())
 
 
-def _classes(data: Dataset) -> list[tuple[object, ...]]:
+def class_rows(data: Dataset) -> list[tuple[object, ...]]:
+    """Rows of class, number of records and range of severity, without reference records."""
     is_example = ~data.is_reference
     names = data.column("label_name")[is_example]
     severity = data.column("severity")[is_example]

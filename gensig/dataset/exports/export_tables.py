@@ -1,4 +1,4 @@
-"""Data sets as npz and Parquet; columns and time signals of all exports."""
+"""Columns and time signals of all exports; data sets as npz."""
 
 import json
 import zipfile
@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gensig.dataset.reader import Dataset
 from gensig.dataset.schema import SCALES, known_column, unit_in_file
-from gensig.errors import DatasetError
 
 ROW_GROUP_BYTES = 16 * 1024**2
 ROWS_LIMIT = 100_000
@@ -37,23 +37,33 @@ def record_bytes(data: Dataset) -> int:
     return sum(signal_row(data, 0, name).nbytes for name in data.signal_names)
 
 
-def signal_row(data: Dataset, index: int, name: str) -> np.ndarray:
-    """One record's time signal.
+def signal_row(
+    data: Dataset, index: int, name: str, start: int = 0, stop: int | None = None
+) -> np.ndarray:
+    """One record's time signal from sample ``start`` to before ``stop``, None is the end.
 
     Accelerations (channel, sample) float32 in m/s^2, others (sample,) as stored.
     """
     if name in SCALES:
-        return data.signals(index, name=name)
-    return data.trace(index, name)
+        return data.signals(index, start, stop, name=name)
+    return data.trace(index, name, start, stop)
 
 
-def write_npz(data: Dataset, path: Path) -> None:
-    """One array a column and signal, and the attributes as JSON text.
+def rows_of_group(n_bytes: int) -> int:
+    """Rows of ``n_bytes`` each that are written to Parquet at once, at least 1."""
+    return max(1, ROW_GROUP_BYTES // max(1, n_bytes))
 
-    No array needs pickle to be read.
+
+def write_npz(
+    data: Dataset, path: Path, further: Mapping[str, NDArray[np.generic]]
+) -> None:
+    """Write one array a column and signal, and the attributes as JSON text.
+
+    ``further`` are further columns by name, (record,) each. No array needs pickle to be read.
     """
     with zipfile.ZipFile(path, "w", allowZip64=True) as archive:
         arrays = {name: data.column(name) for name in column_names(data)}
+        arrays |= further
         arrays["attributes_json"] = np.array(attributes_json(data.attributes))
         for name, values in arrays.items():
             _write_npy(archive, name, values.shape, values.dtype, [values])
@@ -81,55 +91,3 @@ def _write_npy(
         np.lib.format.write_array_header_2_0(stream, header)
         for part in parts:
             stream.write(np.ascontiguousarray(part).tobytes())
-
-
-def write_parquet(data: Dataset, path: Path, *, samples: bool) -> None:
-    """One row a record.
-
-    With `samples`, time signals as lists of fixed length. Units are notes of the columns.
-    """
-    try:
-        import pyarrow
-        from pyarrow import parquet
-    except ImportError as error:
-        raise DatasetError(
-            "format parquet needs the package pyarrow; pip install 'gensig[parquet]'"
-        ) from error
-
-    def nested(values: np.ndarray) -> pyarrow.Array:
-        if values.dtype.kind == "U":
-            return pyarrow.array(values.tolist(), pyarrow.string())
-        array = pyarrow.array(values.reshape(-1))
-        for size in reversed(values.shape[1:]):
-            array = pyarrow.FixedSizeListArray.from_arrays(array, size)
-        return array
-
-    def batch(shard: int, start: int, stop: int) -> pyarrow.RecordBatch:
-        first = data.first_record(shard)
-        arrays = {
-            name: nested(data.shard_column(shard, name)[start:stop])
-            for name in column_names(data)
-        }
-        for name in data.signal_names * samples:
-            rows = [signal_row(data, first + row, name) for row in range(start, stop)]
-            arrays[name] = nested(np.stack(rows))
-        fields = []
-        for name, array in arrays.items():
-            unit = unit_of(data, name)
-            metadata = {"unit": unit} if unit else None
-            fields.append(pyarrow.field(name, array.type, metadata=metadata))
-        schema = pyarrow.schema(fields)
-        return pyarrow.RecordBatch.from_arrays(list(arrays.values()), schema=schema)
-
-    step = ROWS_LIMIT
-    if samples:
-        step = max(1, ROW_GROUP_BYTES // record_bytes(data))
-    notes = {"gensig": attributes_json(data.attributes)}
-    schema = batch(0, 0, 1).schema.with_metadata(notes)
-    # Samples hardly repeat: looking for repetitions takes memory and time for nothing.
-    texts = [field.name for field in schema if pyarrow.types.is_string(field.type)]
-    with parquet.ParquetWriter(path, schema, use_dictionary=texts) as writer:
-        for shard, entry in enumerate(data.manifest.shards):
-            for start in range(0, entry.rows, step):
-                rows = batch(shard, start, min(start + step, entry.rows))
-                writer.write_batch(rows.replace_schema_metadata(schema.metadata))

@@ -82,9 +82,10 @@ def row_of(plan, index, *, status="ok"):
         "signal_power": np.array([1.0, 2.0]),
         "noise_power": np.array([0.1, 0.2]),
     }
-    values = {
+    drawn = {
         name: value for name, value in record.items() if name not in ("shard", "row")
-    } | {
+    }
+    values = {
         **dict(zip(FAULT_COLUMNS, fault, strict=True)),
         "start_tooth_pinion": 1,
         "start_tooth_wheel": 2,
@@ -95,6 +96,7 @@ def row_of(plan, index, *, status="ok"):
         "mesh_frequency_hz": 690.0,
         "snr_db": float("nan"),
         "status": status,
+        **drawn,
     }
     return signals, values
 

@@ -23,7 +23,13 @@ from gensig.dataset.storage.attributes import read_attributes
 from gensig.dataset.storage.guard import open_shard, read_rows
 from gensig.errors import DatasetError
 
-NAMES = {"hdf5": "all.h5", "parquet": "all.parquet", "npz": "all.npz", "wav": "all"}
+NAMES = {
+    "hdf5": "all.h5",
+    "parquet": "all.parquet",
+    "npz": "all.npz",
+    "wav": "all",
+    "hf": "hub",
+}
 
 
 @pytest.fixture(scope="module", params=["float32", "int16"])
