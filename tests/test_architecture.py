@@ -77,8 +77,8 @@ GENSIG = {
     "options": "errors text units",
     "papers": "driveline dynamics faults life operation options sensing signals systems units",
     "plan": (
-        "dataset errors faults geometry life mesh operation options record systems "
-        "units"
+        "dataset dynamics errors faults geometry life mesh operation options record "
+        "systems units"
     ),
     "production": (
         "dataset dynamics errors execution faults life options plan record sensing "

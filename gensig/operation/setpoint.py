@@ -41,7 +41,7 @@ class Operating:
     The driver is T = T_set + k (integral of the set speed - angle) + c (set speed - speed), with
     k and c giving ``drive_frequency`` and ``drive_damping_ratio`` on the inertia reduced to the
     pinion. The profiles are shares of ``speed`` and ``torque``, None is constant; the ripples are
-    on top of them.
+    on top of them. ``speed_tolerance`` is the largest relative error of the mean speed of a record.
     """
 
     speed: float = unit("rpm")
@@ -49,6 +49,7 @@ class Operating:
     duration: float = unit("s")
     drive_frequency: float = unit("hz")
     drive_damping_ratio: float
+    speed_tolerance: float = 0.02
     speed_profile: Profile | None = None
     torque_profile: Profile | None = None
     speed_ripple: Ripple | None = None
@@ -61,6 +62,10 @@ class Operating:
         if not 0.0 < self.drive_damping_ratio <= 10.0:
             raise ConfigError(
                 f"operating.drive_damping_ratio = {self.drive_damping_ratio:g} must lie in 0..10"
+            )
+        if not 0.0 < self.speed_tolerance <= 1.0:
+            raise ConfigError(
+                f"operating.speed_tolerance = {self.speed_tolerance:g} must lie in 0..1"
             )
         if self.speed_profile is not None and not self.speed_profile.least > 0.0:
             raise ConfigError(
@@ -94,6 +99,12 @@ class Operating:
     def is_steady(self) -> bool:
         """True where neither speed nor torque changes."""
         return all(getattr(self, key) is None for key in COURSES)
+
+    @property
+    def mean_speed(self) -> float:
+        """Mean of the set speed over a record, rad/s."""
+        end = self.time_at_set_speed(np.array([self.duration]))
+        return self.speed * float(end[0]) / self.duration
 
     @property
     def without_ripple(self) -> Operating:

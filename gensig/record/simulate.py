@@ -14,6 +14,7 @@ from gensig.dataset.folder.manifest import identity_hash
 from gensig.dynamics.mesh_state import MeshState, mesh_signals
 from gensig.errors import SimulationError
 from gensig.operation.options import operating_signals
+from gensig.operation.setpoint import Operating
 from gensig.options.configuration import Configuration
 from gensig.record.inputs import (
     MISSING,
@@ -156,6 +157,7 @@ def _finished(measured: _Measured) -> Record:
     inputs, motion = measured.inputs, measured.motion
     if isinstance(motion, SimulationError):
         raise motion
+    _check_speed(inputs.machine.operating, motion)
     sensing, dataset = inputs.machine.sensing, inputs.dataset
     clean = inputs.clean(motion.acceleration)
     noise_power = measured.noise_power(clean)
@@ -177,6 +179,22 @@ def _finished(measured: _Measured) -> Record:
     source = motion.acceleration[:, sensing.n_lead :]
     return Record(
         signals=_samples(inputs, noisy, clean, noise_power, source, twin), values=values
+    )
+
+
+def _check_speed(operating: Operating, motion: CleanRecord) -> None:
+    """Raise SimulationError where the drive did not hold the speed of the set-point."""
+    error = abs(motion.mean_speed / operating.mean_speed - 1.0)
+    if error <= operating.speed_tolerance:
+        return
+    turned, wanted = (
+        from_si("speed_rpm", speed)
+        for speed in (motion.mean_speed, operating.mean_speed)
+    )
+    raise SimulationError(
+        f"the mean speed is {turned:.4g} r/min, not {wanted:.4g} (operating.speed_tolerance = "
+        f"{operating.speed_tolerance:g}): the drive does not hold {operating.torque:.4g} N m at "
+        "that speed; lower operating.torque_nm, or raise the speed or the drive's frequency"
     )
 
 

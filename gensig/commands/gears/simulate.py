@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gensig.commands.console import remark, replaced_file
+from gensig.commands.console import note, remark, replaced_file
 from gensig.commands.figures.machine_figures import plot_record, record_name
 from gensig.commands.figures.run_up_figure import plot_run_up
 from gensig.commands.gears.run_up import (
@@ -23,6 +23,7 @@ from gensig.errors import ConfigError
 from gensig.faults.registry import without_vary
 from gensig.life.life_options import NO_LIFE
 from gensig.options.configuration import Configuration
+from gensig.plan.doubts import plan_doubts
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.production.folder import open_shard
@@ -81,7 +82,9 @@ def configured_record(config: Configuration) -> Record:
     config = config.with_entries(
         classes={name: without_vary(config["fault"])}, life={"kind": NO_LIFE}
     )
-    return simulate_record(with_traces(config), make_plan(config).record(0))
+    plan = make_plan(config)
+    note(*plan_doubts(config, plan))
+    return simulate_record(with_traces(config), plan.record(0))
 
 
 def _simulate_recorded(arguments: Namespace) -> int:

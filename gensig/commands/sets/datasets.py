@@ -66,6 +66,7 @@ def generate(arguments: Namespace) -> int:
 def _generate(
     request: Request, out: Path, executor: Executor, arguments: Namespace
 ) -> int:
+    from gensig.plan.doubts import plan_doubts
     from gensig.plan.notes import plan_notes
     from gensig.production.folder import begin_folder
 
@@ -74,6 +75,7 @@ def _generate(
     n_records, n_shards = table.n_records, table.n_shards
     if not arguments.quiet:
         note(*request.notes, *plan_notes(request.config, table))
+        note(*plan_doubts(request.config, table))
         step(f"{out}: making {n_records} records in {n_shards} shard(s)")
     return _run(
         out,
@@ -248,6 +250,7 @@ def _print_failed(out: Path, n_failed: int, n_records: int) -> None:
 
 def plan(arguments: Namespace) -> int:
     """Print records, bytes and time of a data set; with --freeze make its folder too."""
+    from gensig.plan.doubts import plan_doubts
     from gensig.plan.notes import plan_notes
     from gensig.production.folder import begin_folder
     from gensig.production.prediction import predict
@@ -268,6 +271,7 @@ def plan(arguments: Namespace) -> int:
 
     def on_plan(table: Plan, n_timed: int) -> None:
         note(*request.notes, *plan_notes(request.config, table))
+        note(*plan_doubts(request.config, table))
         step(f"making {n_timed} of {table.n_records} records to time them")
 
     for name, value in predict(request.config, on_plan=on_plan).items():
