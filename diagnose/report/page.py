@@ -35,6 +35,7 @@ from diagnose.training.entries import entry_notes
 from diagnose.training.heads import heads_notes
 from gensig.text.page import Section, Table, write_page
 
+PROGRAM = "diagnose train"
 TITLE = "Which faults can be told apart"
 LEAKY_MEANING = (
     "windows of one record on both sides of the split, as in many papers. It shows how much a "
@@ -67,7 +68,9 @@ def write_report(
     sections = _sections(folder, metrics)
     if pictures:
         sections.insert(1, _pictures_section(pictures))
-    write_page(page, title=TITLE, lead=_lead(metrics), sections=sections)
+    write_page(
+        page, title=TITLE, lead=_lead(metrics), sections=sections, program=PROGRAM
+    )
     text = "\n".join(_markdown(metrics, pictures))
     (folder / "report.md").write_text(text, encoding="utf-8")
     return page
