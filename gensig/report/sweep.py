@@ -16,6 +16,7 @@ from gensig.report.packing import pack_signal
 from gensig.report.rotation_frequencies import Rotation
 from gensig.report.signal_views import BESIDE, turn_view
 from gensig.report.turns import aligned, averaged_turn, conspicuity, gear_teeth
+from gensig.text.parameters import size_words
 
 IntArray = NDArray[np.integer]
 
@@ -80,14 +81,6 @@ def sweep_content(
             for index in sweep.records.tolist()
         ],
     }
-
-
-def size_words(name: str) -> tuple[str, str]:
-    """Words and unit of a parameter: ('crack depth', 'mm') of params/fault.crack_depth_mm."""
-    *words, unit = name.removeprefix(SIZES).split("_")
-    if not words:
-        return unit, ""
-    return " ".join(words), unit
 
 
 def step_healthy(data: Dataset, index: int) -> Healthy | None:
@@ -200,7 +193,7 @@ def _label(data: Dataset, sweep: Sweep, index: int) -> str:
     """Size with its unit, severity and set-point of a step in words."""
     parts = [f"severity {data.column('severity')[index]:.3g}"]
     if sweep.size:
-        words, unit = size_words(sweep.size)
+        words, unit = size_words(sweep.size.removeprefix(SIZES))
         size = float(data.column(sweep.size)[index])
         parts.insert(0, f"{words} {size:.3g} {unit}".strip())
     speed, torque = data.column("speed_rpm")[index], data.column("torque_nm")[index]
