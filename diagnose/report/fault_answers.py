@@ -87,7 +87,7 @@ def fault_section(metrics: Content) -> Section:
 
 
 def found_phrase(result: Mapping[str, Any], false_alarms: Mapping[str, Any]) -> str:
-    """Whether and from what size the faults of a class are found.
+    """Phrase on whether and from what size the faults of a class are found.
 
     "always": 90 % at every tested size. "from" a size on: 90 % from there. "sometimes": more often
     than healthy records raise an alarm. "not": no more often than those, or than the 5 % intended.

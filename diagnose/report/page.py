@@ -82,7 +82,7 @@ def _markdown(metrics: Content, pictures: Sequence[tuple[str, str]]) -> list[str
     """Lines of ``report.md``: the first figures, the table of scores and the pictures."""
     first = [f"- **{line}**" for line in headlines(metrics)]
     first += [
-        f"- {name}: found {text}" for name, text in fault_answers(metrics).items()
+        f"- {name}, found: {text}" for name, text in fault_answers(metrics).items()
     ]
     shown = [f"![{caption}]({picture})\n" for picture, caption in pictures]
     lines = [f"# {TITLE}", "", *first, "", data_line(metrics), ""]

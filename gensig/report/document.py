@@ -21,6 +21,7 @@ from gensig.report.measured_ranges import at_measured_rate, compare_with_measure
 from gensig.report.packing import pack_floats
 from gensig.report.realism import Comparison
 from gensig.report.rotation_frequencies import Rotation, read_rotation
+from gensig.report.severity_slider import find_sweeps, sweep_content
 from gensig.report.signal_section import (
     channel_choice,
     choice,
@@ -28,7 +29,6 @@ from gensig.report.signal_section import (
     signals_section,
 )
 from gensig.report.signal_views import first_channel, opening_view, signal_views
-from gensig.report.sweep import find_sweeps, sweep_content
 from gensig.report.values import (
     ALONG,
     INDICATORS,

@@ -94,7 +94,7 @@ def severity_section(sweeps: Sequence[dict[str, Any]], channel: str) -> Section:
 
     Parameters
     ----------
-    sweeps : at least one, of `gensig.report.sweep.sweep_content`
+    sweeps : at least one, of `gensig.report.severity_slider.sweep_content`
     channel : the one that they are of
     """
     steps = [step for sweep in sweeps for step in sweep["steps"]]
@@ -132,7 +132,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def _signal_lines(data: Dataset, chosen: Choice) -> list[str]:
-    """What is shown."""
+    """Sentences on the records that are shown."""
     n_conditions = counted(len(chosen.conditions), "whole condition")
     lines = [
         f"{chosen.n_records} of {data.n_records} records, as {n_conditions}: one unit at one "
@@ -177,20 +177,25 @@ def view_label(view: dict[str, Any]) -> str:
     severity = "unknown"
     if view["severity"] is not None:
         severity = f"{view['severity']:.2f}"
-    return plain(f"{view['class']}, severity {severity}, {view['record']}")
+    label = f"{view['class']}, severity {severity}, {view['record']}"
+    if view["condition"] != view["of"]:
+        label += ", of another condition"
+    return plain(label)
 
 
 def _records_by_condition(
     views: Sequence[dict[str, Any]],
 ) -> list[tuple[str, list[tuple[str, str]]]]:
     """Number and label of each record, by condition; twins are only compared with."""
-    groups: dict[int, tuple[str, list[tuple[str, str]]]] = {}
+    labels: dict[int, str] = {}
+    options: dict[int, list[tuple[str, str]]] = {}
     for number, view in enumerate(views):
-        if view["set"] not in groups:
-            groups[view["set"]] = (_condition_label(view), [])
+        if view["condition"] == view["of"]:
+            labels[view["set"]] = _condition_label(view)
         if view["class"] != "healthy twin":
-            groups[view["set"]][1].append((str(number), view_label(view)))
-    return list(groups.values())
+            option = (str(number), view_label(view))
+            options.setdefault(view["set"], []).append(option)
+    return [(labels[number], options[number]) for number in options]
 
 
 def _condition_label(view: dict[str, Any]) -> str:

@@ -15,7 +15,7 @@ from gensig.report.conditions import Choice, Condition, HealthyKind, Shown
 from gensig.report.examples import example, read_signals
 from gensig.report.packing import pack_signal
 from gensig.report.rotation_frequencies import Rotation
-from gensig.report.sound import sounds
+from gensig.report.sound import heard, sounds
 from gensig.report.turns import (
     Turn,
     aligned,
@@ -38,11 +38,19 @@ BESIDE: dict[HealthyKind, str] = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Signals:
-    """Signals of a condition, in the order of its `shown`, and the averaged turns by gear."""
+class _Read:
+    """Views, sounds and turns of a condition's signals, in the order of its `shown`.
+
+    Parameters
+    ----------
+    views : of `gensig.report.examples.example`
+    parts : of `gensig.report.sound.heard`
+    turns : averaged turns by gear
+    """
 
     condition: Condition
-    values: list[FloatArray]
+    views: list[dict[str, Any]]
+    parts: list[FloatArray]
     turns: dict[str, list[Turn | None]]
 
 
@@ -58,16 +66,23 @@ def signal_views(
 ) -> list[dict[str, Any]]:
     """Every shown record and twin with its views, condition by condition.
 
-    Keys beside those of `gensig.report.examples.example`: ``set``, the number of its condition on
-    the page; ``compare``, numbers of the others of its condition; ``healthy``, number of the
-    healthy signal beside it, or None, and ``beside``, that one in words; ``turned``, the gear
-    whose averaged turn is shown first; ``turns`` by gear; ``sound``, a data URI; and
-    ``conspicuity`` of its averaged turn, or None.
+    Keys beside those of `gensig.report.examples.example`:
+
+    - ``set``, the number of its condition on the page, and ``of``, the condition_id of that;
+    - ``compare``, numbers of the others of its condition;
+    - ``healthy``, number of the healthy signal beside it, or None, and ``beside``, the same in
+      words;
+    - ``turns``, averaged turns by gear, ``turned``, the gear whose turn is shown, and ``tooth``,
+      the faulty one or None;
+    - ``conspicuity`` of its averaged turn, or None;
+    - ``sound``, a data URI.
     """
+    channel = first_channel(chosen.channels)
     result: list[dict[str, Any]] = []
     for number, condition in enumerate(chosen.conditions):
-        signals = _read(data, condition, chosen.channels, rotation)
-        result += _views_of(data, signals, rotation, number, len(result), chosen)
+        read = _read(data, condition, chosen.channels, rotation)
+        for view in _views_of(data, read, rotation, len(result), channel):
+            result.append(view | {"set": number, "of": condition.name})
     return result
 
 
@@ -103,28 +118,32 @@ def _n_turns(view: dict[str, Any]) -> int:
 
 def _read(
     data: Dataset, condition: Condition, channels: Sequence[str], rotation: Rotation
-) -> _Signals:
-    values = [read_signals(data, shown, channels) for shown in condition.shown]
+) -> _Read:
+    """Views, sounds and averaged turns of a condition; its signals are read one at a time."""
+    channel = first_channel(channels)
+    gears = turned_gears(data, rotation, condition.shown)
+    views, parts = [], []
+    averages: dict[str, list[Turn | None]] = {gear: [] for gear in gears}
+    for shown in condition.shown:
+        signals = read_signals(data, shown, channels)
+        views.append(example(data, shown, signals, rotation))
+        parts.append(heard(signals[channel], data.sampling_rate))
+        for gear in gears:
+            turn = averaged_turn(data, rotation, shown, signals, gear)
+            averages[gear].append(turn)
     turns = {}
-    for gear in turned_gears(data, rotation, condition.shown):
-        pairs = zip(condition.shown, values, strict=True)
-        averages = [averaged_turn(data, rotation, *pair, gear) for pair in pairs]
+    for gear in gears:
         n_teeth = gear_teeth(data, rotation, gear, condition.shown[0].index)
-        turns[gear] = aligned(averages, n_teeth or 1)
-    return _Signals(condition=condition, values=values, turns=turns)
+        turns[gear] = aligned(averages[gear], n_teeth or 1)
+    return _Read(condition=condition, views=views, parts=parts, turns=turns)
 
 
 def _views_of(
-    data: Dataset,
-    signals: _Signals,
-    rotation: Rotation,
-    number: int,
-    first: int,
-    chosen: Choice,
+    data: Dataset, read: _Read, rotation: Rotation, first: int, channel: int
 ) -> list[dict[str, Any]]:
     """Views of one condition, whose first has the number `first` on the page."""
-    condition, channel = signals.condition, first_channel(chosen.channels)
-    heard = sounds([x[channel] for x in signals.values], data.sampling_rate)
+    condition = read.condition
+    files = sounds(read.parts)
     numbers = range(first, first + len(condition.shown))
     result = []
     for at, shown in enumerate(condition.shown):
@@ -133,29 +152,27 @@ def _views_of(
         if beside is not None:
             healthy = first + condition.shown.index(beside.shown)
             words = BESIDE[beside.kind]
-        view = example(data, shown, signals.values[at], rotation)
-        gear = _turned_gear(data, signals, shown)
-        view |= {
-            "set": number,
+        gear = _turned_gear(data, read, shown)
+        view: dict[str, Any] = {
             "compare": [other for other in numbers if other != first + at],
             "healthy": healthy,
             "beside": words,
             "turned": gear,
-            "turns": _turn_views(data, signals, rotation, at),
+            "turns": _turn_views(data, read, rotation, at),
             "tooth": _faulty_tooth(data, shown),
-            "sound": heard[at],
+            "sound": files[at],
             "conspicuity": None,
         }
         if healthy is not None:
             pair = (at, healthy - first)
-            view["conspicuity"] = _conspicuity(signals, gear, pair, channel)
-        result.append(view)
+            view["conspicuity"] = _conspicuity(read, gear, pair, channel)
+        result.append(read.views[at] | view)
     return result
 
 
-def _turned_gear(data: Dataset, signals: _Signals, shown: Shown) -> str:
+def _turned_gear(data: Dataset, read: _Read, shown: Shown) -> str:
     """Gear of a record's fault where its turn is averaged, else the first such gear, or ""."""
-    gears = list(signals.turns)
+    gears = list(read.turns)
     if "fault_gear" in data.column_names:
         gear = str(data.column("fault_gear")[shown.index])
         if gear in gears:
@@ -174,12 +191,12 @@ def _faulty_tooth(data: Dataset, shown: Shown) -> int | None:
 
 
 def _turn_views(
-    data: Dataset, signals: _Signals, rotation: Rotation, at: int
+    data: Dataset, read: _Read, rotation: Rotation, at: int
 ) -> dict[str, Any]:
     """Averaged turns of one record by gear, those that it has."""
-    shown = signals.condition.shown[at]
+    shown = read.condition.shown[at]
     views = {}
-    for gear, turns in signals.turns.items():
+    for gear, turns in read.turns.items():
         turn = turns[at]
         n_teeth = gear_teeth(data, rotation, gear, shown.index)
         if turn is not None and n_teeth is not None:
@@ -198,12 +215,12 @@ def turn_view(turn: Turn, n_teeth: int) -> dict[str, Any]:
 
 
 def _conspicuity(
-    signals: _Signals, gear: str, pair: tuple[int, int], channel: int
+    read: _Read, gear: str, pair: tuple[int, int], channel: int
 ) -> float | None:
     """Conspicuity of the first of two signals against the second, None without both turns."""
-    if gear not in signals.turns:
+    if gear not in read.turns:
         return None
-    turns = [signals.turns[gear][at] for at in pair]
+    turns = [read.turns[gear][at] for at in pair]
     values = [turn.values[channel] for turn in turns if turn is not None]
     if len(values) < len(pair):
         return None

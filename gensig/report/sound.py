@@ -25,15 +25,14 @@ def heard(signal: FloatArray, sampling_rate: float) -> FloatArray:
     return rate_change(sampling_rate, SOUND_RATE).apply(part - part.mean())
 
 
-def sounds(signals: Sequence[FloatArray], sampling_rate: float) -> list[str]:
-    """WAV files as data URIs, 16 bit, one channel, one scale for all signals.
+def sounds(parts: Sequence[FloatArray]) -> list[str]:
+    """WAV files as data URIs, 16 bit, one channel, one scale for all.
 
     Parameters
     ----------
-    signals : (sample,) each, of one condition and channel: their loudness can be compared
-    sampling_rate : Hz
+    parts : (sample,) each, of `heard`, of one condition and channel, so that their loudness can
+        be compared
     """
-    parts = [heard(signal, sampling_rate) for signal in signals]
     peak = max((float(np.abs(part).max(initial=0.0)) for part in parts), default=0.0)
     scale = LOUDEST * COUNTS / (peak or 1.0)
     return [wav_uri(np.rint(scale * part).astype("<i2")) for part in parts]

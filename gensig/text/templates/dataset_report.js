@@ -57,7 +57,8 @@
 
   function short_name(record) {
     if (is_twin(record)) return "healthy twin of " + record.record;
-    return record.class + ", severity " + short(record.severity) + ", " + record.record;
+    const other = record.condition === record.of ? "" : ", of another condition";
+    return record.class + ", severity " + short(record.severity) + ", " + record.record + other;
   }
 
   // Only records of the same condition can be compared; the healthy one is chosen first.

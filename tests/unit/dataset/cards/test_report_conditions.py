@@ -15,9 +15,10 @@ from gensig.report.conditions import Shown, choose, healthy_beside
 from gensig.report.document import report_text
 from gensig.report.examples import read_signals
 from gensig.report.rotation_frequencies import read_rotation
+from gensig.report.severity_slider import find_sweeps, sweep_content
+from gensig.report.signal_section import view_label
 from gensig.report.signal_views import opening_view, signal_views
 from gensig.report.sound import LOUDEST, SOUND_RATE
-from gensig.report.sweep import find_sweeps, sweep_content
 from gensig.report.turns import Turn, aligned, averaged_turn, conspicuity, turned
 from gensig.signals.averaging import time_synchronous_average
 
@@ -304,3 +305,20 @@ def test_a_set_without_twins_has_a_slider_where_a_condition_holds_several_sizes(
     }
     assert '<input type="range" name="step" min="0" max="3"' in text
     assert 'id="plot-step_wave"' not in text  # no twin to subtract
+
+
+def test_a_healthy_record_of_another_condition_is_named_as_such(tmp_path):
+    label = np.array([0, 1])
+    columns = {
+        "label": label,
+        "label_name": np.array(["healthy", "crack"]),
+        "condition_id": np.array(["c0", "c1"]),
+        "unit_id": np.full(2, "u"),
+    }
+    folder = build(tmp_path / "set", whole_conditions(n_records=2, **columns))
+    views = views_of(folder)
+    (crack,) = [view for view in views if view["class"] == "crack"]
+    beside = views[crack["healthy"]]
+    assert (beside["of"], beside["condition"]) == ("c1", "c0")
+    assert view_label(beside).endswith(", of another condition")
+    assert not view_label(crack).endswith(", of another condition")
