@@ -5,6 +5,7 @@ from __future__ import annotations
 from diagnose.data.protocols import NEW_MACHINE
 from diagnose.report.methods import CHANCE, REFERENCE_TEXT
 from diagnose.scoring.judged import interval_text
+from diagnose.studies.protocol_results import main_protocol
 from diagnose.studies.result_files import Content
 
 UNKNOWN_MACHINE = "unknown machine"
@@ -16,12 +17,7 @@ CONDITIONS = {
 
 def headline_protocol(metrics: Content) -> str | None:
     """Protocol of the headlines; without one of new machines the first that is not leaky."""
-    clean = [
-        name for name, result in metrics["protocols"].items() if not result["leaky"]
-    ]
-    if NEW_MACHINE in clean:
-        return NEW_MACHINE
-    return next(iter(clean), None)
+    return main_protocol(metrics["protocols"])
 
 
 def headlines(metrics: Content) -> list[str]:

@@ -119,6 +119,7 @@ def write_life_report(
         title="How long the machines still run",
         lead=_lead(metrics),
         sections=[*sections, files_section(FILES)],
+        program="diagnose train",
     )
     return page
 

@@ -10,6 +10,7 @@ from diagnose.data.protocols import MEANING
 from diagnose.report.answer_sections import answer_sections
 from diagnose.report.answer_tables import write_tables
 from diagnose.report.control_sections import controls_section
+from diagnose.report.fault_answers import fault_answers, fault_section
 from diagnose.report.figures import confusion_figure, reliability_figure, scores_figure
 from diagnose.report.headlines import headlines
 from diagnose.report.markdown import table_lines
@@ -23,6 +24,7 @@ from diagnose.report.text import (
     few_groups,
     fewest,
     files_section,
+    leaky_card,
     level_text,
     made_by,
     recall_table,
@@ -35,10 +37,11 @@ from diagnose.training.entries import entry_notes
 from diagnose.training.heads import heads_notes
 from gensig.text.page import Section, Table, write_page
 
+PROGRAM = "diagnose train"
 TITLE = "Which faults can be told apart"
 LEAKY_MEANING = (
-    "windows of one record on both sides of the split, as in many papers. It shows how much a "
-    "careless split flatters; it is no measure of diagnosis"
+    "windows of one record on both sides of the split, as in many papers. It is no measure of "
+    "diagnosis"
 )
 FILES = {
     "report.md": "the first figures and the table of scores as text.",
@@ -66,8 +69,10 @@ def write_report(
     page = folder / "report.html"
     sections = _sections(folder, metrics)
     if pictures:
-        sections.insert(1, _pictures_section(pictures))
-    write_page(page, title=TITLE, lead=_lead(metrics), sections=sections)
+        sections.insert(2, _pictures_section(pictures))
+    write_page(
+        page, title=TITLE, lead=_lead(metrics), sections=sections, program=PROGRAM
+    )
     text = "\n".join(_markdown(metrics, pictures))
     (folder / "report.md").write_text(text, encoding="utf-8")
     return page
@@ -76,6 +81,9 @@ def write_report(
 def _markdown(metrics: Content, pictures: Sequence[tuple[str, str]]) -> list[str]:
     """Lines of ``report.md``: the first figures, the table of scores and the pictures."""
     first = [f"- **{line}**" for line in headlines(metrics)]
+    first += [
+        f"- {name}, found: {text}" for name, text in fault_answers(metrics).items()
+    ]
     shown = [f"![{caption}]({picture})\n" for picture, caption in pictures]
     lines = [f"# {TITLE}", "", *first, "", data_line(metrics), ""]
     return [*lines, *result_table(metrics), "", *shown, *without_interval(metrics), ""]
@@ -156,7 +164,6 @@ def _lead(metrics: Content) -> list[str]:
     samples = metrics["settings"]["window_samples"]
     window_ms = 1e3 * samples / metrics["sampling_rate_hz"]
     return [
-        *headlines(metrics),
         data_line(metrics),
         f"Network: {metrics['model']} on windows of {window_ms:.0f} ms, {level_text(metrics)}, "
         f"{made_by(metrics)}",
@@ -169,7 +176,7 @@ def _sections(folder: Path, metrics: Content) -> list[Section]:
     clean = {name: result for name, result in ordered if not result["leaky"]}
     novelty = metrics["novelty"]
     warnings = [("", line) for line in caveats(metrics)]
-    sections = []
+    sections = [fault_section(metrics)]
     if ordered:
         sections += _score_sections(folder, metrics, ordered)
     if clean:
@@ -200,12 +207,13 @@ def _score_sections(folder: Path, metrics: Content, ordered: Entries) -> list[Se
     for name, result in ordered:
         meaning = MEANING.get(name, LEAKY_MEANING)
         if result["leaky"]:
-            meaning = LEAKY_MEANING
-        cards.append(answer_card(name, result, metrics["model"], meaning))
+            cards.append(leaky_card(name, metrics))
+        else:
+            cards.append(answer_card(name, result, metrics["model"], meaning))
     scores_figure(folder / "scores.png", metrics)
     return [
         Section(
-            title="In short",
+            title="Protocols",
             text=[
                 "Balanced accuracy of the network over test records: the mean share recognised "
                 "of each class."

@@ -69,26 +69,61 @@ def files_section(files: Mapping[str, str]) -> Section:
 
 
 def answer_card(name: str, result: Content, model: str, meaning: str) -> Card:
-    """One protocol's score against chance, the best baseline, the oracle and the controls."""
+    """A clean protocol's score against chance, the best baseline, oracle and controls."""
     methods = result["methods"]
     score = methods[model]["balanced_accuracy"]
     chance = methods["chance"]["balanced_accuracy"]
-    title, mark, verdict = f"{name} (LEAKY)", "quiet", ["not a result"]
-    if not result["leaky"]:
-        title, mark = name, "bad"
-        verdict, leak = _verdict(result, score, chance)
-        if is_above(score, chance) and not leak:
-            mark = "good"
-        if not meaning.startswith("tested"):
-            meaning = f"tested {meaning}"
+    mark = "bad"
+    verdict, leak = _verdict(result, score, chance)
+    if is_above(score, chance) and not leak:
+        mark = "good"
+    if not meaning.startswith("tested"):
+        meaning = f"tested {meaning}"
     return Card(
-        title=title,
+        title=name,
         value=f"{score['mean']:.2f}",
         spread=_spread(score),
         verdict="; ".join(verdict),
         meaning=f"{meaning[0].upper()}{meaning[1:]}.",
         mark=mark,
     )
+
+
+def leaky_card(name: str, metrics: Content) -> Card:
+    """A leaky protocol's score, and its difference to a clean one as this study measured it."""
+    result, model = metrics["protocols"][name], metrics["model"]
+    score = result["methods"][model]["balanced_accuracy"]
+    split = "Windows of one record are on both sides of this split."
+    leak = result.get("leak")
+    if not leak:
+        verdict = "not a result"
+        meaning = f"{split} No clean protocol was run beside it."
+    else:
+        against, difference = leak["against"], leak["difference"]
+        clean = metrics["protocols"][against]["methods"][model]["balanced_accuracy"]
+        shown = interval_text(difference, "+.2f")
+        verdict = f"not a result; {shown} against {against} ({clean['mean']:.2f})"
+        meaning = f"{split} {_leak_words(difference, against)}"
+    return Card(
+        title=f"{name} (LEAKY)",
+        value=f"{score['mean']:.2f}",
+        spread=_spread(score),
+        verdict=verdict,
+        meaning=meaning,
+        mark="quiet",
+    )
+
+
+def _leak_words(difference: Content, against: str) -> str:
+    """Meaning of the difference between a leaky and a clean protocol."""
+    if difference["low"] is None:
+        return "The difference has no interval, so that nothing can be said of it."
+    mean = abs(difference["mean"])
+    if difference["low"] > 0:
+        return f"In this study it shows {mean:.2f} more than {against}."
+    if difference["high"] < 0:
+        return f"In this study it shows {mean:.2f} less than {against}."
+    return f"In this study it is not told from {against}."
 
 
 def _verdict(result: Content, score: Content, chance: float) -> tuple[list[str], bool]:

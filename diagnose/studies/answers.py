@@ -16,10 +16,10 @@ from diagnose.baselines.registry import baseline_names
 from diagnose.data.windows import Task
 from diagnose.scoring.conditions import by_condition, condition_columns
 from diagnose.scoring.detection_limit import HEALTHY, detection, size_columns
-from diagnose.scoring.judged import Judged
+from diagnose.scoring.judged import Judged, resampled_score, score, with_interval
 from diagnose.scoring.machines import machines_of
 from diagnose.scoring.metrics import balanced_accuracy
-from diagnose.scoring.paired import compare
+from diagnose.scoring.paired import ACCURACY, compare
 from diagnose.scoring.predictions import Prediction
 from diagnose.scoring.window_length import by_window_length
 from diagnose.settings import TrainSettings
@@ -91,6 +91,39 @@ def protocol_answers(
     if any(run.windows is not None for run in runs[name]):
         result["window_length"] = _window_length(task, settings, runs[name])
     return result
+
+
+def leak_answer(
+    task: Task,
+    settings: TrainSettings,
+    leaky: Sequence[Prediction],
+    clean: Sequence[Prediction],
+) -> Entry:
+    """Balanced accuracy of the network on a leaky protocol less that on a clean one.
+
+    The interval resamples the machines of both test parts and the seeds, each part for itself.
+    Where they share machines it is wider than it need be.
+
+    Parameters
+    ----------
+    leaky, clean : of the network, one a seed
+    """
+    judged = [
+        _judged(task, runs[0].method, runs, runs[0].record) for runs in (leaky, clean)
+    ]
+    rng = _generator()
+    resampled = [
+        resampled_score(
+            one, ACCURACY, one.machines.drawn(settings.n_bootstrap, rng), rng
+        )
+        for one in judged
+    ]
+    difference = score(judged[0], ACCURACY) - score(judged[1], ACCURACY)
+    support = min((one.support for one in judged), key=lambda part: part.n_groups)
+    return {
+        "against": clean[0].protocol,
+        "difference": with_interval(difference, resampled[0] - resampled[1], support),
+    }
 
 
 def _generator() -> np.random.Generator:

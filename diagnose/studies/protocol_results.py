@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnose.data.protocols import NEW_MACHINE
 from diagnose.data.windows import Task
 from diagnose.networks.calibration import calibration_scores
 from diagnose.scoring.machines import machines_of
@@ -48,6 +49,19 @@ def is_leaky(protocol: str) -> bool:
     Such a score is no measure of diagnosis.
     """
     return "leaky" in protocol
+
+
+def main_protocol(results: Mapping[str, Entry]) -> str | None:
+    """Protocol that answers for a study: that of new machines, else the first clean one.
+
+    Parameters
+    ----------
+    results : ``protocols`` of ``metrics.json``, or any entries with ``leaky``
+    """
+    clean = [name for name, result in results.items() if not result["leaky"]]
+    if NEW_MACHINE in clean:
+        return NEW_MACHINE
+    return next(iter(clean), None)
 
 
 def score_predictions(

@@ -33,8 +33,10 @@ from diagnose.networks.registry import (
 )
 from diagnose.scoring.predictions import Prediction, write_predictions
 from diagnose.settings import BOTH, TrainSettings
+from diagnose.studies.answers import leak_answer
 from diagnose.studies.baseline_runs import reasons_left_out
 from diagnose.studies.controls import control_jobs, sham_methods, without_sham
+from diagnose.studies.counts import by_method
 from diagnose.studies.jobs import (
     WITH_REFERENCE,
     Job,
@@ -51,6 +53,7 @@ from diagnose.studies.novelty_metrics import (
 from diagnose.studies.protocol_results import (
     BOOTSTRAP_SEED,
     is_leaky,
+    main_protocol,
     protocol_result,
     score_predictions,
     test_score,
@@ -232,6 +235,7 @@ def run_study(
             )
         else:
             results[name] = protocol_result(task, settings, name, on_data)
+    _add_leaks(task, settings, results, on_data)
     score = functools.partial(score_predictions, n_bootstrap=n_bootstrap)
     for protocol, methods in sham_methods(task, settings, predictions, score).items():
         results[protocol]["methods"] |= methods
@@ -247,6 +251,24 @@ def run_study(
         "baselines_left_out": baselines_left_out(task, settings, protocols),
         "duration_s": round(time.perf_counter() - started, 1),
     }
+
+
+def _add_leaks(
+    task: Task,
+    settings: TrainSettings,
+    results: Entry,
+    predictions: Sequence[Prediction],
+) -> None:
+    """Write ``leak`` into the result of each leaky protocol, where a clean one was run."""
+    against = main_protocol(results)
+    if against is None:
+        return
+    name = network_name(settings)
+    clean = by_method(predictions, against)[name]
+    for protocol, result in results.items():
+        if result["leaky"]:
+            leaky = by_method(predictions, protocol)[name]
+            result["leak"] = leak_answer(task, settings, leaky, clean)
 
 
 def baselines_left_out(

@@ -238,7 +238,7 @@ SET_VERBS = {
             text(
                 "--out",
                 "FILE",
-                "page to write, a new file (default: DIR/report.html)",
+                "page to write; replaces an earlier one (default: DIR/report.html)",
             ),
             count(
                 "--records",

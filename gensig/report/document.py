@@ -4,24 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gensig.dataset.cards.card import plain
-from gensig.dataset.cards.class_figures import FIRST_CHOICE
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.dataset.storage.atomic import write_bytes
 from gensig.errors import ConfigError
 from gensig.report import tables
-from gensig.report.examples import Choice, choose, envelope_band, example, usable_top
+from gensig.report.conditions import Choice, choose
+from gensig.report.examples import usable_top
 from gensig.report.levels import VELOCITY, level_table, loudness, velocity_rms
 from gensig.report.measured_ranges import at_measured_rate, compare_with_measurements
 from gensig.report.packing import pack_floats
 from gensig.report.realism import Comparison
 from gensig.report.rotation_frequencies import Rotation, read_rotation
+from gensig.report.severity_slider import find_sweeps, sweep_content
+from gensig.report.signal_section import (
+    channel_choice,
+    choice,
+    severity_section,
+    signals_section,
+)
+from gensig.report.signal_views import first_channel, opening_view, signal_views
 from gensig.report.values import (
     ALONG,
     INDICATORS,
@@ -35,19 +42,20 @@ from gensig.report.values import (
     some_records,
     value_table,
 )
-from gensig.text.page import Charts, Section, Select, Switch, interactive_page
+from gensig.text.page import (
+    Charts,
+    Section,
+    Select,
+    Switch,
+    interactive_page,
+    is_page_of,
+)
 
 SCRIPT = "dataset_report.js"
 REPORT = "report.html"
 MOST_BYTES = 15_000_000
 COMPARED = ("low", "high", "median", "p5", "p95", "verdict")
-MARKS = (
-    ("decibel", "logarithmic", True),
-    ("mesh", "mesh harmonics", True),
-    ("sidebands", "sidebands", False),
-    ("shafts", "shaft orders", False),
-    ("fault", "fault frequency", True),
-)
+PROGRAM = "gensig report"
 
 
 def write_report(
@@ -55,20 +63,25 @@ def write_report(
 ) -> tuple[Path, str]:
     """Write the page of a complete data set; returns its path and a one-line summary.
 
+    An earlier page of `gensig report` is replaced whole, any other file is kept.
+
     Parameters
     ----------
-    out : file that does not exist yet; None is `REPORT` in the folder
+    out : file to write; None is `REPORT` in the folder
     per_class : records shown of each class; None lets the page's size decide
 
     Raises
     ------
-    ConfigError     for a file that exists, a folder that does not, or less than one record
+    ConfigError     for a file that is no page of `gensig report`, a folder that does not exist,
+                    or less than one record
     DatasetError    for a folder that is no data set, incomplete or damaged
     """
     path = out or folder / REPORT
-    if path.exists() or path.is_symlink():
+    exists = path.exists() or path.is_symlink()
+    if exists and not is_page_of(path, PROGRAM):
         raise ConfigError(
-            f"{path} exists already; remove it, or choose another --out FILE"
+            f"{path} exists and does not say that {PROGRAM} wrote it; remove it, or choose "
+            "another --out FILE"
         )
     if out is not None and not path.parent.is_dir():
         raise ConfigError(
@@ -98,34 +111,42 @@ def report_text(data: Dataset, per_class: int | None) -> tuple[str, str]:
     measured = measure(data, rotation, chosen.channels, _further)
     compared = compare_with_measurements(data, measured, channel_units)
     content = _content(data, chosen, rotation, channel_units, drawn, measured, compared)
-    name = plain(data.folder.resolve().name)
-    n_shown = sum(len(records) for records in chosen.records.values())
     sections = [
-        *tables.contents(data),
-        _signals(data, chosen, rotation, content["examples"]),
-        _parameters(data, content["drawn"]),
-        _indicators(data, chosen, measured, content["measured"], channel_units),
+        signals_section(
+            data, chosen, rotation, content["examples"], content["opening"]
+        ),
     ]
+    if "severity" in content:
+        channel = chosen.channels[first_channel(chosen.channels)]
+        sections.append(severity_section(content["severity"], channel))
     if "lives" in content:
         sections.append(_lives(content["lives"]))
     sections += [
+        _indicators(data, chosen, measured, content["measured"], channel_units),
+        _parameters(data, content["drawn"]),
         _comparisons(compared, channel_units),
+        *tables.contents(data),
         tables.splits(data),
         *tables.loading(data),
         *tables.provenance(data),
     ]
     version = plain(data.manifest.generator_version)
+    n_classes = len(data.class_names)
+    classes = "1 class"
+    if n_classes > 1:
+        classes = f"{n_classes} classes"
     page = interactive_page(
-        title=f"Data set {name}",
+        title=f"Data set {plain(data.folder.resolve().name)}",
         lead=[
-            f"{data.n_records} records of {len(data.class_names)} classes, simulated and "
-            f"labelled by gensig {version}. This page stands alone: it fetches nothing."
+            f"{data.n_records} records of {classes}, simulated and labelled by gensig "
+            f"{version}. This page stands alone: it fetches nothing."
         ],
         sections=sections,
         script=SCRIPT,
         data=content,
+        program=PROGRAM,
     )
-    return page, f"{n_shown} records shown, {len(measured.records)} measured"
+    return page, f"{chosen.n_records} records shown, {len(measured.records)} measured"
 
 
 def _content(
@@ -143,20 +164,27 @@ def _content(
     for name, values in measured.values.items():
         table["columns"][name] = pack_floats(values)
     channels = zip(chosen.channels, units, strict=True)
-    indices = chain.from_iterable(chosen.records.values())
+    examples = signal_views(data, chosen, rotation)
+    first = first_channel(chosen.channels)
     content = {
         "classes": [plain(name) for name in data.class_names],
         "channels": [
             {"name": plain(name), "unit": plain(unit)} for name, unit in channels
         ],
         "top": usable_top(data),
-        "examples": [
-            example(data, index, chosen.channels, rotation) for index in indices
-        ],
+        "examples": examples,
+        "opening": opening_view(examples),
+        "first_channel": first,
         "drawn": value_table(data, drawn, drawn_columns(data, drawn)),
         "measured": table,
         "beside": [_comparison(comparison) for comparison in compared],
     }
+    sweeps = find_sweeps(data, rotation)
+    if sweeps:
+        name = chosen.channels[first]
+        content["severity"] = [
+            sweep_content(data, rotation, sweep, name) for sweep in sweeps
+        ]
     if has_lives(data):
         content["lives"] = life_table(data)
     return content
@@ -165,109 +193,6 @@ def _content(
 def _comparison(comparison: Comparison) -> dict[str, Any]:
     values = {key: getattr(comparison, key) for key in COMPARED}
     return {"name": f"{comparison.id}, {comparison.at}", **values}
-
-
-def _choice(
-    name: str, label: str, options: Sequence[tuple[str, str]], chosen: str = ""
-) -> Select:
-    """A drop-down of one group of (value, text)."""
-    return Select(name=name, label=label, groups=[("", options)], chosen=chosen)
-
-
-def _channel_choice(chosen: Choice) -> Select:
-    """The drop-down of channels; that of the data card's figures is shown first."""
-    options = [(str(k), plain(name)) for k, name in enumerate(chosen.channels)]
-    first = 0
-    if FIRST_CHOICE in chosen.channels:
-        first = chosen.channels.index(FIRST_CHOICE)
-    return _choice("channel", "Channel", options, str(first))
-
-
-def _records_by_class(
-    examples: list[dict[str, Any]],
-) -> dict[str, list[tuple[str, str]]]:
-    """Number and label of each example, by class."""
-    groups: dict[str, list[tuple[str, str]]] = {}
-    for number, shown in enumerate(examples):
-        severity = "unknown"
-        if shown["severity"] is not None:
-            severity = f"{shown['severity']:.2f}"
-        record = f"severity {severity}, {shown['unit']}, {shown['record']}"
-        text = plain(f"{shown['class']}, {record}")
-        groups.setdefault(plain(shown["class"]), []).append((str(number), text))
-    return groups
-
-
-def _signals(
-    data: Dataset, chosen: Choice, rotation: Rotation, examples: list[dict[str, Any]]
-) -> Section:
-    groups = _records_by_class(examples)
-    of_last = groups[list(groups)[-1]]
-    first = of_last[len(of_last) // 2][0]
-    selection, sound = "of each class, from", ""
-    if has_lives(data):
-        first = of_last[-1][0]
-        selection = "of each class, those of one life from"
-    if "healthy" in groups:
-        first = groups["healthy"][0][0]
-        sound = "; sound ones at the conditions of the middle one of another class"
-    orders = [("hz", "Hz and ms")] + [
-        (name, f"orders: {words}") for name, words in rotation.references
-    ]
-    zooms = [("all", "usable band")]
-    if any(name == "mesh" for name, _ in orders):
-        zooms += [(f"{k}", f"around mesh harmonic {k}") for k in (1, 2, 3)]
-    counts = f"{len(examples)} of {data.n_records} records"
-    lines = [
-        f"{counts}: {selection} the least to the greatest severity{sound}.",
-        "Orders are multiples of the chosen shaft's mean speed. Amplitudes of spectra are "
-        "rounded to 0.4 dB; waveform and spectrogram are those of the first samples, "
-        "up to 8192.",
-    ]
-    others = [("", "nothing"), ("same", "its machine, least damaged")]
-    if chosen.remark:
-        lines.insert(1, f"Shown are {chosen.remark}.")
-    return Section(
-        title="Signals",
-        text=lines,
-        charts=Charts(
-            name="signals",
-            label="Choice of signal",
-            selects=[
-                Select(
-                    name="record",
-                    label="Record",
-                    groups=list(groups.items()),
-                    chosen=first,
-                ),
-                Select(
-                    name="other",
-                    label="Compare with",
-                    chosen="same",
-                    groups=[("", others), *groups.items()],
-                ),
-                _channel_choice(chosen),
-                _choice("axis", "Axis", orders, "hz"),
-                _choice("zoom", "Spectrum", zooms, "all"),
-            ],
-            switches=[
-                Switch(name=name, label=label, on=on) for name, label, on in MARKS
-            ],
-            plots=_plots(data.sampling_rate),
-        ),
-    )
-
-
-def _plots(sampling_rate: float) -> list[tuple[str, str]]:
-    """Names and titles of the plots of a signal."""
-    low, high = envelope_band(sampling_rate)
-    band = f"{low / 1e3:.3g} to {high / 1e3:.3g} kHz"
-    return [
-        ("wave", "Waveform"),
-        ("spectrum", "Amplitude spectrum"),
-        ("envelope", f"Spectrum of the envelope of {band}"),
-        ("spectrogram", "Spectrogram"),
-    ]
 
 
 def _parameters(data: Dataset, table: dict[str, Any]) -> Section:
@@ -300,7 +225,7 @@ def _parameters(data: Dataset, table: dict[str, Any]) -> Section:
                     groups=[("drawn", drawn), ("of the record", other)],
                     chosen=[*speeds, ""][0],
                 ),
-                _choice("form", "Shown as", forms),
+                choice("form", "Shown as", forms),
             ],
             plots=[("parameters", "Distribution by class")],
         ),
@@ -336,10 +261,7 @@ def _indicators(
         return Section(title="Condition indicators", text=["No record tells one."])
     levels = level_table(data, measured, chosen.channels, units)
     if levels is not None:
-        text += [
-            "Below: medians of each class, levels as machine monitoring states them.",
-            *loudness(data, measured, chosen.channels, units),
-        ]
+        text += loudness(data, measured, chosen.channels, units)
     return Section(
         title="Condition indicators",
         text=text,
@@ -348,9 +270,9 @@ def _indicators(
             name="indicators",
             label="Choice of indicator",
             selects=[
-                _choice("indicator", "Indicator", known),
-                _choice("along", "Over", along, "severity"),
-                _channel_choice(chosen),
+                choice("indicator", "Indicator", known),
+                choice("along", "Over", along, "severity"),
+                channel_choice(chosen),
             ],
             switches=[Switch(name="decibel", label="logarithmic", on=False)],
             plots=[("indicators", "Indicator by class"), ("levels", "Spread by class")],
@@ -370,7 +292,7 @@ def _lives(table: dict[str, Any]) -> Section:
         charts=Charts(
             name="lives",
             label="Choice of quantity",
-            selects=[_choice("quantity", "Quantity", quantities)],
+            selects=[choice("quantity", "Quantity", quantities)],
             switches=[
                 Switch(name="relative", label="time as a share of the life", on=False)
             ],
@@ -388,7 +310,9 @@ def _comparisons(compared: Sequence[Comparison], units: Sequence[str]) -> Sectio
         label="Nothing to choose",
         plots=[("beside", "Measured ranges and this set")],
     )
-    return replace(section, charts=charts)
+    assert section.table is not None  # there are comparisons
+    table = replace(section.table, folded="The same as a table")
+    return replace(section, charts=charts, table=table)
 
 
 def _of(n_rows: int, data: Dataset) -> str:

@@ -1,9 +1,8 @@
-"""Records that the page shows: their choice, waveform, spectra and spectrogram."""
+"""Records that the page shows: waveform, spectra and spectrogram."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,17 +10,14 @@ from numpy.typing import NDArray
 
 from gensig.dataset.reader import Dataset
 from gensig.errors import DatasetError
+from gensig.report.conditions import TWIN, Shown
 from gensig.report.packing import pack_amplitude, pack_signal
 from gensig.report.rotation_frequencies import Rotation
-from gensig.report.values import has_lives
 from gensig.signals.envelope import envelope_spectrum
 from gensig.signals.spectrum import amplitude_spectrum
 
 FloatArray = NDArray[np.floating]
 
-RECORDS_PER_CLASS = 3
-SIGNALS_BY_DEFAULT = 48  # records times channels: about 3 MB
-SIGNALS_AT_MOST = 140  # about 9 MB, plotly.js 5 MB: the page stays below 15 MB
 WAVEFORM_SAMPLES = 8192
 SPECTRUM_SAMPLES = 2**20  # longer records are read up to here
 SPECTRUM_BINS = 20_000
@@ -34,115 +30,50 @@ WINDOW_SAMPLES = 256  # of the spectrogram
 SPECTROGRAM_COLUMNS = 96
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
-    """Records (by number) and channels (by name) that are shown.
-
-    ``remark`` is one line on the parts that were left out, or "".
-    """
-
-    records: dict[str, list[int]]
-    channels: list[str]
-    remark: str
-
-    @property
-    def n_signals(self) -> int:
-        """Records times channels."""
-        return len(self.channels) * sum(map(len, self.records.values()))
-
-
-def choose(data: Dataset, per_class: int | None) -> Choice:
-    """Usable records of each class, from the least to the greatest severity.
-
-    The healthy ones are of the same machines.
-
-    Parameters
-    ----------
-    per_class : records of a class; None takes `RECORDS_PER_CLASS`, or fewer for a small page
-    """
-    label, usable = data.column("label_name"), data.usable
-    classes = [name for name in data.class_names if np.any((label == name) & usable)]
-    if not classes:
-        raise DatasetError(
-            f"{data.folder} has no usable record to show; gensig inspect {data.folder} says why"
-        )
-    limit, wanted = SIGNALS_BY_DEFAULT, RECORDS_PER_CLASS
-    if per_class is not None:
-        limit, wanted = SIGNALS_AT_MOST, per_class
-    n_channels = min(len(data.channel_names), max(limit // len(classes), 1))
-    n_shown = max(min(wanted, limit // (len(classes) * n_channels)), 1)
-    chosen = {name: _spread(data, name, n_shown) for name in classes}
-    if "healthy" in chosen:
-        faulty = [chosen[name] for name in classes if name != "healthy"]
-        chosen["healthy"] = _sound(data, faulty[::-1], n_shown)
-    remarks, n_all = [], len(data.channel_names)
-    small = "so that the page stays small"
-    if n_shown < wanted:
-        remarks.append(f"{n_shown} instead of {wanted} records a class, {small}")
-    if n_channels < n_all:
-        remarks.append(f"the first {n_channels} of {n_all} channels, {small}")
-    return Choice(
-        records=chosen,
-        channels=data.channel_names[:n_channels],
-        remark="; ".join(remarks),
-    )
-
-
-def _spread(data: Dataset, name: str, n_shown: int) -> list[int]:
-    """Records of a class, or of its worst life, at even steps of the rank of their severity."""
-    result = np.flatnonzero((data.column("label_name") == name) & data.usable)
-    result = result[np.argsort(data.column("severity")[result], kind="stable")]
-    if has_lives(data):  # the machine that gets worst, from its beginning
-        life = data.column("life_id")[result]
-        result = result[life == life[-1]]
-    ranks = np.array([result.size // 2])
-    if n_shown > 1:
-        ranks = np.linspace(0, result.size - 1, n_shown)
-    return list(dict.fromkeys(result[np.rint(ranks).astype(int)].tolist()))
-
-
-def _sound(data: Dataset, faulty: Sequence[Sequence[int]], n_shown: int) -> list[int]:
-    """Healthy records at the conditions of the middle faulty records, filled up with any."""
-    condition, unit = data.column("condition_id"), data.column("unit_id")
-    sound = np.flatnonzero((data.column("label_name") == "healthy") & data.usable)
-    result: list[int] = []
-    for records in faulty:
-        middle = records[len(records) // 2]
-        is_same = (condition[sound] == condition[middle]) & (
-            unit[sound] == unit[middle]
-        )
-        result += sound[is_same][:1].tolist()
-    result = list(dict.fromkeys(result))[:n_shown]
-    others = _spread(data, "healthy", n_shown)
-    return list(dict.fromkeys([*result, *others]))[:n_shown]
-
-
-def example(
-    data: Dataset, index: int, channels: Sequence[str], rotation: Rotation
-) -> dict[str, Any]:
-    """Labels and frequencies of a record, and four views of each channel.
+def read_signals(data: Dataset, shown: Shown, channels: Sequence[str]) -> FloatArray:
+    """The beginning of a record or of its healthy twin, (channel, sample).
 
     Raises
     ------
-    DatasetError    for a record with values that are not finite
+    DatasetError    for values that are not finite
     """
+    name = "acceleration"
+    if shown.is_twin:
+        name = TWIN
     n_read = min(data.n_samples, SPECTRUM_SAMPLES)
-    signals = data.signals(index, stop=n_read, channels=list(channels)).astype(float)
-    record_id = str(data.column("record_id")[index])
-    if not np.isfinite(signals).all():
+    read = data.signals(shown.index, stop=n_read, channels=list(channels), name=name)
+    if not np.isfinite(read).all():
+        record_id = data.column("record_id")[shown.index]
         raise DatasetError(
             f"record {record_id} holds values that are not finite; run gensig verify"
         )
+    return read.astype(float)
+
+
+def example(
+    data: Dataset, shown: Shown, signals: FloatArray, rotation: Rotation
+) -> dict[str, Any]:
+    """Labels and frequencies of a record or twin, and four views of each channel.
+
+    Parameters
+    ----------
+    signals : (channel, sample) of `read_signals`
+    """
+    index = shown.index
+    name, fault = str(data.column("label_name")[index]), rotation.fault_gear(index)
+    severity = _finite(data.column("severity")[index])
+    if shown.is_twin:
+        name, fault, severity = "healthy twin", "", 0.0
     rate, top, frequencies = data.sampling_rate, usable_top(data), rotation.of(index)
     return {
-        "record": record_id,
-        "class": str(data.column("label_name")[index]),
-        "severity": _finite(data.column("severity")[index]),
+        "record": str(data.column("record_id")[index]),
+        "class": name,
+        "severity": severity,
         "unit": str(data.column("unit_id")[index]),
         "condition": str(data.column("condition_id")[index]),
         "torque": _finite(data.column("torque_nm")[index]),
         "frequencies": frequencies,
-        "fault": rotation.fault_gear(index),
+        "fault": fault,
         "views": [_views(signal, rate, top, frequencies["mesh"]) for signal in signals],
     }
 

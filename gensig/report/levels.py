@@ -17,6 +17,7 @@ from gensig.text.page import Table
 FloatArray = NDArray[np.floating]
 
 VELOCITY = "velocity_rms"
+LEVELS = "Levels in m/s², g and mm/s, medians of each class"
 BAND = (10.0, 1000.0)  # Hz, of broad-band velocity in ISO 20816-1 and -3
 # m/s, zone boundary C/D of ISO 20816-3 for large machines on flexible supports
 HARMFUL_VELOCITY = 11.0e-3
@@ -82,7 +83,7 @@ def level_table(
         "RMS, g",
         "velocity RMS 10 to 1000 Hz, mm/s",
     )
-    return Table(head=head, rows=rows)
+    return Table(head=head, rows=rows, folded=LEVELS)
 
 
 def loudness(

@@ -86,9 +86,10 @@ def contents(data: Dataset) -> list[Section]:
     if "life_id" in data.column_names:
         n_lives = len(np.unique(data.column("life_id")))
         rows.append(("lives", f"{n_lives}, to failure or to the horizon"))
+    facts = Table(head=("fact", "value"), rows=rows)
     return [
-        Section(title="What is in it", table=Table(head=("fact", "value"), rows=rows)),
-        Section(title="Classes", table=_classes(data)),
+        Section(title="What is in it", table=facts, folded=True),
+        Section(title="Classes", table=_classes(data), folded=True),
     ]
 
 
@@ -153,7 +154,7 @@ def splits(data: Dataset) -> Section:
     table = None
     if rows:
         table = Table(head=head, rows=rows, quiet=leaky)
-    return Section(title="Splits", text=text, table=table, notes=left_out)
+    return Section(title="Splits", text=text, table=table, notes=left_out, folded=True)
 
 
 def measured_table(compared: Sequence[Comparison], units: Sequence[str]) -> Section:
@@ -224,7 +225,9 @@ def provenance(data: Dataset) -> list[Section]:
         text.append(f"The first {MANY_SHARDS} of {len(manifest.shards)} shards.")
     return [
         Section(
-            title="Where it is from", table=Table(head=("fact", "value"), rows=rows)
+            title="Where it is from",
+            table=Table(head=("fact", "value"), rows=rows),
+            folded=True,
         ),
         Section(
             title="Overrides as typed", code=_file(data.folder / OVERRIDES), folded=True

@@ -16,15 +16,22 @@ from pathlib import Path
 from typing import Any
 
 MARKS = ("", "good", "bad", "quiet")
+GENERATOR_BYTES = 1000  # of a page, within which its generator is named
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """Cells of plain text under a head; `quiet` rows are set in grey."""
+    """Cells of plain text under a head; `quiet` rows are set in grey.
+
+    Parameters
+    ----------
+    folded : what the reader clicks to open the table; "" for one that is open
+    """
 
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
     quiet: Sequence[int] = ()
+    folded: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,24 +75,36 @@ class Switch:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Slider:
+    """A range of charts, from 0 to `last` in whole steps; the script says what a step is."""
+
+    name: str
+    label: str
+    last: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Charts:
     """Charts that share controls: `name` finds the function of the page's script that draws them.
 
     Parameters
     ----------
     plots : (name, what it shows)
+    sounds : (name, what is heard), players whose file the script sets
     """
 
     name: str
     label: str
     selects: Sequence[Select] = ()
+    sliders: Sequence[Slider] = ()
     switches: Sequence[Switch] = ()
     plots: Sequence[tuple[str, str]] = ()
+    sounds: Sequence[tuple[str, str]] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """A heading and below it, in this order, text, cards, a table, notes, figures, charts and code.
+    """A heading and below it, in this order, text, charts, cards, a table, notes, figures and code.
 
     Parameters
     ----------
@@ -109,10 +128,33 @@ class Section:
     folded: bool = False
 
 
+def generator_mark(program: str) -> str:
+    """Tag that names the program in each of its pages."""
+    return f'<meta name="generator" content="{program}">'
+
+
+def is_page_of(path: Path, program: str) -> bool:
+    """True for an ordinary file that says it is a page of the program."""
+    if path.is_symlink() or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return generator_mark(program).encode() in file.read(GENERATOR_BYTES)
+
+
 def write_page(
-    path: Path, *, title: str, lead: Sequence[str], sections: Sequence[Section]
+    path: Path,
+    *,
+    title: str,
+    lead: Sequence[str],
+    sections: Sequence[Section],
+    program: str,
 ) -> None:
-    """Write the page with copies of its figures, which lie in its folder."""
+    """Write the page with copies of its figures, which lie in its folder.
+
+    Parameters
+    ----------
+    program : named as the generator of the page
+    """
 
     def embedded(name: str) -> str:
         return f"data:image/png;base64,{_base64((path.parent / name).read_bytes())}"
@@ -121,6 +163,7 @@ def write_page(
         title=title,
         lead=lead,
         sections=sections,
+        program=program,
         embedded=embedded,
         scripts=(),
         data="",
@@ -135,11 +178,13 @@ def interactive_page(
     sections: Sequence[Section],
     script: str,
     data: Mapping[str, Any],
+    program: str,
 ) -> str:
     """The text of a page with charts, which cannot hold figures of files.
 
     Parameters
     ----------
+    program : named as the generator of the page
     script : file in the folder ``templates`` whose functions draw the charts
     data : JSON, without NaN, that the script draws; see ``gensig.report.packing`` for arrays
     """
@@ -159,13 +204,14 @@ def interactive_page(
         title=title,
         lead=lead,
         sections=sections,
+        program=program,
         embedded=None,
         scripts=scripts,
         data=content,
     )
 
 
-def _render(*, scripts: Sequence[str], **content: Any) -> str:
+def _render(*, scripts: Sequence[str], program: str, **content: Any) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -181,6 +227,7 @@ def _render(*, scripts: Sequence[str], **content: Any) -> str:
         policy = " ".join(["script-src", *(f"'sha256-{text}'" for text in digests)])
         policy += "; "
     content |= {
+        "generator": Markup(generator_mark(program)),
         "data": Markup(content["data"]),
         "scripts": [Markup(text) for text in scripts],
         "policy": Markup(policy),

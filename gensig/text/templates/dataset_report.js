@@ -43,21 +43,39 @@
       margin: { l: 60, r: 12, t: 32, b: 44 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       font: { color: ink, size: 12 }, legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", x: 0 }, hovermode: "closest",
       dragmode: coarse.matches ? false : "zoom", ...layout,
-      xaxis: { ...axis, ...layout.xaxis }, yaxis: { ...axis, exponentformat: layout.yaxis.type === "log" ? "power" : "none", ...layout.yaxis },
+      xaxis: { ...axis, ...layout.xaxis },
+      yaxis: { ...axis, ...layout.yaxis },
     };
+    if (full.yaxis.type === "log") full.yaxis.exponentformat = "power";
+    if (layout.yaxis2) full.yaxis2 = { ...axis, ...layout.yaxis2 };
     node.setAttribute("aria-label", what);
     Plotly.react(node, traces, full, { responsive: true, displaylogo: false, displayModeBar: coarse.matches ? false : "hover", scrollZoom: false });
   }
 
   // ---- signals -------------------------------------------------------------------------------------------------
-  function machine(record) {
-    const mine = DATA.examples.filter((one) => one.unit === record.unit && one !== record);
-    const sound = mine.find((one) => one.class === "healthy" && one.condition === record.condition);
-    return sound || mine.filter((one) => one.severity < record.severity).sort((a, b) => a.severity - b.severity)[0];
+  const is_twin = (record) => record.class === "healthy twin";
+
+  function short_name(record) {
+    if (is_twin(record)) return "healthy twin of " + record.record;
+    const other = record.condition === record.of ? "" : ", of another condition";
+    return record.class + ", severity " + short(record.severity) + ", " + record.record + other;
+  }
+
+  // Only records of the same condition can be compared; the healthy one is chosen first.
+  function offer_others(record) {
+    const field = document.getElementById("signals-controls").elements.other;
+    const options = [["", "nothing"], ...record.compare.map((k) => [String(k), short_name(DATA.examples[k])])];
+    field.replaceChildren(...options.map(([value, text]) => {
+      const option = document.createElement("option");
+      option.value = value;
+      option.textContent = text;
+      return option;
+    }));
+    field.value = record.healthy === null ? "" : String(record.healthy);
   }
 
   function name_of(record) {
-    const f = record.frequencies, parts = [record.class, "severity " + short(record.severity), record.unit, record.record];
+    const f = record.frequencies, parts = [short_name(record), record.unit];
     if (f.drive) parts.push(short(f.drive * 60) + " r/min of the driving shaft");
     parts.push(short(record.torque) + " N m");
     if (f.mesh) parts.push("mesh " + short(f.mesh) + " Hz");
@@ -105,18 +123,77 @@
     }, (key === "spectrum" ? "Amplitude spectrum: " : "Envelope spectrum: ") + shown.map((one) => name_of(one.record)).join("; beside ") + ". Marked: " + (marks.map((one) => one.name).join(", ") || "nothing"));
   }
 
+  // Averaged turns of a gear above, and their difference below.
+  function draw_turns(plot, pair, teeth, gear, tooth, of, what) {
+    const at = (packed) => ramp(packed.length, 0, teeth / packed.length, 1);
+    const blue = dark.matches ? "#56B4E9" : "#0072B2", red = dark.matches ? "#E69F00" : "#D55E00";
+    const colors = pair.length > 1 ? ["#7F7F7F", blue] : [blue];
+    const lines = pair.map((one) => wave(one.packed));
+    const traces = pair.map((one, i) => ({
+      x: at(lines[i]), y: lines[i], mode: "lines", name: one.label, line: { color: colors[i], width: 1.2 },
+    }));
+    const layout = {
+      xaxis: { title: { text: "tooth of the " + safe(gear) }, range: [0, teeth], anchor: "y" },
+      yaxis: { title: { text: safe(of.name) + ", " + unit(of.unit) } },
+    };
+    if (pair.length > 1) {
+      const difference = lines[1].map((y, i) => y - lines[0][i]);
+      traces.push({ x: at(difference), y: difference, mode: "lines", name: "difference", yaxis: "y2", line: { color: red, width: 1.2 } });
+      Object.assign(layout.yaxis, { domain: [0.44, 1] });
+      layout.yaxis2 = { domain: [0, 0.36] };
+      layout.xaxis.anchor = "y2";
+    }
+    if (tooth !== null) {
+      layout.shapes = [{ type: "rect", xref: "x", yref: "paper", x0: tooth, x1: tooth + 1, y0: 0, y1: 1, fillcolor: red, opacity: 0.15, line: { width: 0 }, layer: "below" }];
+    }
+    draw(plot, traces, layout, what);
+  }
+
+  function draw_averaged_turn(record, beside, channel) {
+    const gear = record.turned, mine = record.turns[gear], of = DATA.channels[channel];
+    const part = (one) => ({ packed: one.turns[gear].channels[channel], label: safe(short_name(one)) });
+    if (!mine) return draw("turn", [], { annotations: [note("no whole turn of a known gear")] }, "No averaged turn");
+    const pair = beside && beside.turns[gear] ? [part(beside), part(record)] : [part(record)];
+    const tooth = mine.from_tooth_0 ? record.tooth : null;
+    draw_turns("turn", pair, mine.teeth, gear, tooth, of, "Averaged turn of the " + gear + " over " + mine.n_turns + " turns: " + pair.map((one) => one.label).join("; beside "));
+  }
+
+  function turns_in(record) {
+    const mine = record.turns[record.turned];
+    return mine ? ". Averaged over " + mine.n_turns + (mine.n_turns === 1 ? " turn" : " turns") + " of the " + record.turned : "";
+  }
+
+  const note = (text) => ({ text, showarrow: false, xref: "paper", yref: "paper", x: 0.5, y: 0.5 });
+
+  function set_sound(name, record) {
+    const player = document.getElementById("sound-" + name), said = document.getElementById("sound-" + name + "-said");
+    player.parentNode.hidden = !record;
+    if (!record || player.getAttribute("src") === record.sound) return;
+    player.setAttribute("src", record.sound);
+    said.textContent = "Sound of " + short_name(record) + " (" + DATA.channels[DATA.first_channel].name + ")";
+    player.setAttribute("aria-label", said.textContent);
+  }
+
+  let offered = DATA.opening;
   function draw_signals() {
-    const values = chosen("signals"), record = DATA.examples[Number(values.record)], channel = Number(values.channel), view = record.views[channel];
-    const beside = values.other === "same" ? machine(record) : values.other === "" ? undefined : DATA.examples[Number(values.other)];
+    const record_number = Number(chosen("signals").record);
+    if (record_number !== offered) offer_others(DATA.examples[record_number]);
+    offered = record_number;
+    const values = chosen("signals"), record = DATA.examples[record_number], channel = Number(values.channel), view = record.views[channel];
+    const beside = values.other === "" ? undefined : DATA.examples[Number(values.other)];
+    const of_healthy = values.other !== "" && Number(values.other) === record.healthy ? " (" + record.beside + ")" : "";
+    set_sound("record", record);
+    set_sound("other", beside);
+    draw_averaged_turn(record, beside, channel);
     const reference = values.axis === "hz" ? null : record.frequencies[values.axis];
-    const label = (one) => safe(one.class + " " + short(one.severity) + ", " + one.record);
-    const shown = beside && beside !== record ? [{ record: beside, view: beside.views[channel], label: label(beside), color: "#7F7F7F" }] : [];
+    const label = (one) => safe(short_name(one));
+    const shown = beside ? [{ record: beside, view: beside.views[channel], label: label(beside), color: "#7F7F7F" }] : [];
     shown.push({ record, view, label: label(record), color: dark.matches ? "#56B4E9" : "#0072B2" });
     const orders = values.axis === "mesh" ? "orders of the mesh" : "orders of the " + (values.axis === "drive" ? "driving shaft" : values.axis);
     const frequency_title = reference ? orders : "frequency, Hz", factor = reference ? 1 / reference : 1;
     const time_title = reference ? (values.axis === "mesh" ? "meshes" : "turns") + (values.axis === "mesh" ? "" : " of the " + (values.axis === "drive" ? "driving shaft" : values.axis)) : "time, ms";
     const of = DATA.channels[channel], amplitude_title = "amplitude, " + unit(of.unit);
-    say("signals", of.name + ": " + name_of(record) + (beside && beside !== record ? ". Grey: " + name_of(beside) : values.other === "same" ? ". This page has no less damaged record of this machine" : "") + ".");
+    say("signals", of.name + ": " + name_of(record) + (beside ? ". Grey: " + name_of(beside) + of_healthy : "") + turns_in(record) + (record.healthy === null && record.severity > 0 ? ". There is no healthy signal of its condition" : "") + ".");
 
     const own = (one) => (values.axis === "hz" ? 1e3 : one.record.frequencies[values.axis] || 1e3); // each over its own turns
     draw("wave", shown.map((one) => {
@@ -138,6 +215,42 @@
       type: "heatmap", z, x: ramp(columns, packed.time, packed.time_step, own({ record })), y: ramp(rows, 0, packed.step, factor), colorscale: "Cividis", zmin: highest - 70, zmax: highest,
       colorbar: { title: { text: "dB re 1 " + unit(of.unit), side: "right" }, thickness: 12 }, hovertemplate: "%{x:.4~g}, %{y:.4~g}: %{z:.1f} dB<extra></extra>",
     }], { xaxis: { title: { text: time_title } }, yaxis: { title: { text: frequency_title } } }, "Spectrogram of " + name_of(record) + ", the last 70 dB");
+  }
+
+  // ---- severity ------------------------------------------------------------------------------------------------
+  function draw_severity() {
+    const form = document.getElementById("severity-controls"), slider = form.elements.step;
+    const sweep = DATA.severity[Number(chosen("severity").class)], of = DATA.channels[DATA.first_channel];
+    slider.max = String(sweep.steps.length - 1);
+    const number = Number(slider.value), step = sweep.steps[number];
+    slider.setAttribute("aria-valuetext", step.label);
+    say("severity", sweep.class + ", " + step.label + ", " + step.record + " (" + (number + 1) + " of " + sweep.steps.length + "). Grey: " + step.beside);
+    if (step.turns.length === 2) {
+      const [mine, healthy] = step.turns;
+      const pair = [{ packed: healthy.channels[0], label: "healthy" }, { packed: mine.channels[0], label: safe(step.label) }];
+      draw_turns("step_turn", pair, mine.teeth, sweep.gear, mine.from_tooth_0 ? step.tooth : null, of, "Averaged turn at " + step.label);
+    } else {
+      draw("step_turn", [], { annotations: [note("no averaged turn")] }, "No averaged turn");
+    }
+    draw_change(sweep, number);
+    if (document.getElementById("plot-step_wave")) draw_step_wave(step, of);
+  }
+
+  function draw_change(sweep, number) {
+    const known = sweep.steps.filter((step) => step.change !== null), at = sweep.steps[number], blue = style(0).color;
+    const points = { x: known.map((step) => step.severity), y: known.map((step) => step.change), text: known.map((step) => safe(step.label)) };
+    const traces = [{ ...points, mode: "lines+markers", name: "records", line: { color: blue, width: 1 }, hovertemplate: "%{text}: %{y:.3~g}<extra></extra>" }];
+    if (at.change !== null) {
+      traces.push({ x: [at.severity], y: [at.change], mode: "markers", name: "shown", marker: { color: style(1).color, size: 13, symbol: "circle-open", line: { width: 3 } }, hoverinfo: "skip" });
+    }
+    draw("step_change", traces, { xaxis: { title: { text: "severity" } }, yaxis: { title: { text: "change" }, rangemode: "tozero" } }, "Change of the averaged turn over severity, " + sweep.class);
+  }
+
+  function draw_step_wave(step, of) {
+    if (!step.wave) return draw("step_wave", [], { annotations: [note("no twin")] }, "No twin");
+    const y = wave(step.wave);
+    const trace = { x: ramp(y.length, 0, step.wave.step, 1e3), y, mode: "lines", name: "record minus twin", line: { color: style(1).color, width: 1 } };
+    draw("step_wave", [trace], { xaxis: { title: { text: "time, ms" } }, yaxis: { title: { text: safe(of.name) + ", " + unit(of.unit) } } }, "Record minus its healthy twin at " + step.label);
   }
 
   // ---- parameters and indicators -------------------------------------------------------------------------------
@@ -219,11 +332,12 @@
     ], { xaxis: { title: { text: "value" }, range: [0, highest] }, yaxis: { tickvals: rows.map((_, i) => i), ticktext: names, range: [-0.6, rows.length - 0.4] } }, "Measured ranges beside this set");
   }
 
-  const DRAWERS = { signals: draw_signals, parameters: draw_parameters, indicators: draw_indicators, lives: draw_lives, beside: draw_beside };
+  const DRAWERS = { signals: draw_signals, severity: draw_severity, parameters: draw_parameters, indicators: draw_indicators, lives: draw_lives, beside: draw_beside };
   const present = Object.entries(DRAWERS).filter(([name]) => document.getElementById(name + "-controls"));
   for (const [name, drawer] of present) {
     const form = document.getElementById(name + "-controls");
     form.addEventListener("change", drawer);
+    form.querySelectorAll("input[type=range]").forEach((slider) => slider.addEventListener("input", drawer));
     form.addEventListener("submit", (event) => event.preventDefault());
     drawer();
   }

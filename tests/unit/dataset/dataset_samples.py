@@ -69,8 +69,15 @@ def make_plan(
     )
 
 
+def whole_conditions(n_records=12, **columns):
+    """A plan of one shard whose conditions each hold a record of every class on one unit."""
+    plan = make_plan(n_records=n_records, records_per_shard=n_records)
+    conditions = np.array([f"c{index // len(CLASSES)}" for index in range(n_records)])
+    return Plan(columns={**plan.columns, "condition_id": conditions, **columns})
+
+
 def row_of(plan, index, *, status="ok"):
-    """Signals and values of one record."""
+    """Signals and values of one record; columns of faults that the plan has are the plan's."""
     record = plan.record(index)
     label = int(record["label"])
     faults = ("[]", 0.0, "", -1), ('[{"kind": "crack"}]', 0.25, "pinion", 3)
@@ -137,20 +144,27 @@ def write_shard(
     *,
     failed=None,
     clean=False,
+    twin=False,
     **changes,
 ):
     """With ``clean``, every record's signal is stored a second time as the one without noise, at
-    half its size."""
+    half its size. With ``twin``, as that of its healthy twin, at a quarter."""
     rows = plan.rows(shard)
+    stored = {}
     if clean:
-        changes["signals"] = SIGNALS | {"acceleration_clean": (2, 200)}
+        stored["acceleration_clean"] = 2
+    if twin:
+        stored["healthy_twin"] = 4
+    if stored:
+        changes["signals"] = SIGNALS | dict.fromkeys(stored, (2, 200))
     writer = writer_of(path, len(rows), **changes)
     with writer:
         for row, index in enumerate(rows.tolist()):
             status = "failed" if index == failed else "ok"
             signals, values = row_of(plan, index, status=status)
-            if clean and index != failed:
-                signals["acceleration_clean"] = signals["acceleration"] / 2
+            if index != failed:
+                for name, part in stored.items():
+                    signals[name] = signals["acceleration"] / part
             if index == failed:
                 del signals["acceleration"]
             writer.write(row, signals, values)
@@ -165,6 +179,7 @@ def build(
     close=True,
     failed=None,
     clean=False,
+    twin=False,
     figures=False,
     **storage,
 ):
@@ -181,7 +196,13 @@ def build(
     )
     for shard in shards if shards is not None else range(plan.n_shards):
         writer = write_shard(
-            shard_path(out, shard), plan, shard, failed=failed, clean=clean, **storage
+            shard_path(out, shard),
+            plan,
+            shard,
+            failed=failed,
+            clean=clean,
+            twin=twin,
+            **storage,
         )
         record_shard(out, shard, writer.sha256, writer.n_bytes, writer.n_failed)
     if close:

@@ -7,8 +7,9 @@ the path, or the one that ``playwright install chromium`` fetches; without them 
 import os
 import shutil
 
+import numpy as np
 import pytest
-from dataset_samples import ATTRIBUTES, build, make_plan
+from dataset_samples import ATTRIBUTES, build, whole_conditions
 
 from gensig.report.document import write_report
 
@@ -34,15 +35,16 @@ def browser():
 
 @pytest.fixture(scope="module")
 def page_file(tmp_path_factory):
-    """A page of 36 records and two channels, one of them with a hostile name."""
+    """A page of 36 records with twins and two channels, one of them with a hostile name."""
     attributes = {
         **ATTRIBUTES,
         "channel_names": ["pinion_y", HOSTILE],
         "channel_units": ["m/s^2", "rad/s"],
     }
-    folder = build(
-        tmp_path_factory.mktemp("page") / "set", make_plan(), attributes=attributes
-    )
+    severity = 0.05 * np.arange(36.0) / 2 * (np.arange(36) % 3 > 0)
+    plan = whole_conditions(36, severity=severity)
+    folder = tmp_path_factory.mktemp("page") / "set"
+    build(folder, plan, attributes=attributes, twin=True)
     return write_report(folder, folder.parent / "page.html")[0]
 
 
@@ -108,7 +110,7 @@ def test_legends_are_clear_of_the_toolbar(page):
 
 def test_record_channel_and_comparison(page):
     form = "#signals-controls"
-    for value in ("0", "4"):
+    for value in ("1", "5"):
         page.select_option(f"{form} [name=record]", value)
         expected = page.evaluate(
             "i => JSON.parse(document.getElementById('data').textContent).examples[i].record",
@@ -116,10 +118,16 @@ def test_record_channel_and_comparison(page):
         )
         assert expected in page.evaluate(TRACES, "wave")[-1]
         assert expected in page.inner_text("#signals-said")
-    page.select_option(f"{form} [name=other]", "1")
-    assert len(page.evaluate(TRACES, "wave")) == 2
+        other = page.eval_on_selector_all(
+            f"{form} [name=other] option", "options => options.map(o => o.value)"
+        )
+        condition = set(range(3 * (int(value) // 3), 3 * (int(value) // 3) + 3))
+        assert {int(k) for k in other if k} == condition - {int(value)}
+        assert len(page.evaluate(TRACES, "wave")) == 2
+        assert page.evaluate(TRACES, "turn")[-1] == "difference"
     page.select_option(f"{form} [name=other]", "")
     assert len(page.evaluate(TRACES, "wave")) == 1
+    assert len(page.evaluate(TRACES, "turn")) == 1
     first = drawn(page, "wave", "y[7]")
     page.select_option(f"{form} [name=channel]", "1")
     assert drawn(page, "wave", "y[7]") != first
@@ -173,3 +181,49 @@ def test_parameters_and_indicators(page):
     assert drawn(page, "indicators", "y[0]") != first
     page.locator("#indicators-controls [name=decibel]").check()
     assert layout(page, "levels", "yaxis.type") == "log"
+
+
+def test_the_difference_is_that_of_the_two_turns(page):
+    """The page opens on a fault over its healthy record."""
+    values = page.evaluate(
+        "() => document.getElementById('plot-turn').data.map(t => Array.from(t.y))"
+    )
+    healthy, fault, difference = (np.array(line) for line in values)
+    np.testing.assert_allclose(difference, fault - healthy, rtol=0, atol=1e-12)
+    assert np.abs(difference).max() > 0.1
+    first, second, _ = page.evaluate(TRACES, "turn")
+    assert first.startswith("healthy")
+    assert not second.startswith("healthy")
+
+
+def test_sounds_are_those_of_the_records_shown(page):
+    heard = page.evaluate(
+        """async () => Promise.all(['record', 'other'].map(name => new Promise(done => {
+            const player = document.getElementById('sound-' + name);
+            player.addEventListener('loadedmetadata', () => done(player.duration));
+            player.addEventListener('error', () => done(-1));
+            player.load();
+        })))"""
+    )
+    assert heard == pytest.approx([0.2, 0.2], abs=1e-3)
+    before = page.get_attribute("#sound-record", "src")
+    page.select_option("#signals-controls [name=record]", "5")
+    assert page.get_attribute("#sound-record", "src") != before
+    page.select_option("#signals-controls [name=other]", "")
+    assert not page.is_visible("#sound-other")
+
+
+def test_the_slider_steps_by_keyboard_and_says_the_severity(page):
+    slider = page.locator("#severity-controls [name=step]")
+    slider.focus()
+    said = []
+    for _ in range(3):
+        page.keyboard.press("ArrowRight")
+        said.append(page.inner_text("#severity-said"))
+        assert slider.get_attribute("aria-valuetext") in said[-1]
+    assert len(set(said)) == 3
+    assert "(4 of 12)" in said[-1]
+    assert page.evaluate(TRACES, "step_turn")[-1] == "difference"
+    assert len(page.evaluate("document.getElementById('plot-step_wave').data")) == 1
+    page.select_option("#severity-controls [name=class]", "1")
+    assert "pitting" in page.inner_text("#severity-said")

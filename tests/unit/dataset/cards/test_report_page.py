@@ -10,14 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dataset_samples import ATTRIBUTES, CLASSES, build, forge, setting
+from dataset_samples import ATTRIBUTES, build, forge, setting
 from numpy.testing import assert_allclose
 
 from gensig.cli import main
 from gensig.dataset.folder.verify import verify as verify_folder
 from gensig.errors import ConfigError, DatasetError
+from gensig.report.conditions import choose
 from gensig.report.document import write_report
-from gensig.report.examples import _lines, choose
+from gensig.report.examples import _lines
 from gensig.report.levels import level_table, loudness, velocity_rms
 from gensig.report.packing import STEP_DB, pack_amplitude, pack_signal
 from gensig.report.rotation_frequencies import Rotation, read_rotation
@@ -128,11 +129,23 @@ def test_structure(made):
             assert attributes["aria-label"]
     divs = [attributes for _, attributes in page.tags]
     plots = {result["id"] for result in divs if result.get("class") == "plot"}
-    shown = ("wave", "spectrum", "envelope", "spectrogram", "parameters", "indicators")
+    signals = ("turn", "wave", "spectrum", "envelope", "spectrogram")
+    shown = (*signals, "parameters", "indicators")
     assert {f"plot-{name}" for name in shown} <= plots
 
 
-def test_every_option_has_its_data_and_a_healthy_record_is_first(made, plan):
+def test_charts_come_first_and_tables_of_facts_are_folded(made):
+    page = made[1]
+    first_plot = page.text.index('class="plot"')
+    for title in ("What is in it", "Classes", "Splits", "Where it is from"):
+        assert re.search(rf"<details[^>]*><summary><h2>{title}</h2>", page.text)
+        assert page.text.index(f"<h2>{title}</h2>") > first_plot
+    unfolded = re.sub(r"<details.*?</details>", "", page.text, flags=re.DOTALL)
+    assert "<table" in page.text
+    assert "<table" not in unfolded
+
+
+def test_every_option_has_its_data(made, plan):
     page, data = made[1], made[1].data
     options = page.all("option")
     values = [attributes.get("value") for attributes in options]
@@ -149,9 +162,6 @@ def test_every_option_has_its_data_and_a_healthy_record_is_first(made, plan):
     name = "params/crack_depth_mm"
     column = decoded(data["drawn"]["columns"][name], "<f4")
     assert_allclose(column, plan.columns[name], rtol=1e-6, atol=0)
-    selected = [result["value"] for result in options if "selected" in result]
-    first = next(int(value) for value in selected if value.isdigit())
-    assert examples[first]["class"] == "healthy"
 
 
 def test_the_signals_are_those_of_the_records(made, data):
@@ -210,21 +220,12 @@ def test_the_code_on_the_page_runs(made, monkeypatch):
     assert names["signal"].shape == (2, 200)
 
 
-def test_sound_records_of_the_same_machine_stand_beside(data):
-    chosen = choose(data, None).records
-    assert {name: len(chosen[name]) for name in chosen} == dict.fromkeys(CLASSES, 3)
-    units, conditions = data.column("unit_id"), data.column("condition_id")
-    machine = list(zip(units, conditions, strict=True))
-    matched = {machine[index] for index in chosen["healthy"]}
-    sound = {machine[index] for index in np.flatnonzero(data.column("label") == 0)}
-    middle = {machine[chosen[name][1]] for name in ("crack", "pitting")}
-    assert middle & sound <= matched
-
-
 def test_what_does_not_fit_is_left_out_and_said(data):
-    chosen = choose(data, 30)
-    assert chosen.n_signals <= 140
-    assert "instead of 30 records a class" in chosen.remark
+    chosen = choose(data, 300)
+    assert chosen.n_signals <= 100
+    chosen = choose(data, None)
+    assert chosen.n_signals <= 48
+    assert chosen.remark == ""
     data.channel_names = [f"c{i}" for i in range(40)]
     chosen = choose(data, None)
     assert chosen.n_signals <= 48
@@ -262,11 +263,43 @@ def test_frequencies_of_a_geared_engine(drive, references):
 def test_the_page_in_the_folder_leaves_the_set_whole(tmp_path, plan, capsys):
     folder = build(tmp_path / "set", plan, failed=4)
     assert main(["report", str(folder), "--records", "1"]) == 0
-    assert "3 records shown, 35 measured" in capsys.readouterr().out
+    assert "4 records shown, 35 measured" in capsys.readouterr().out
     assert not verify_folder(folder).problems
-    assert main(["report", str(folder)]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
+    once = (folder / "report.html").read_text(encoding="utf-8")
+    assert main(["report", str(folder), "--records", "3"]) == 0
+    assert "records shown" in capsys.readouterr().out
+    again = (folder / "report.html").read_text(encoding="utf-8")
+    assert len(Page(again).data["examples"]) > len(Page(once).data["examples"])
+    assert not verify_folder(folder).problems
     assert not list(folder.glob(".*report*"))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "<!doctype html><title>mine</title>",
+        "",
+        '<meta name="generator" content="diagnose train">',
+        " " * 2000 + '<meta name="generator" content="gensig report">',
+    ],
+)
+def test_a_file_of_another_program_is_kept(template, tmp_path, content, capsys):
+    page = tmp_path / "page.html"
+    page.write_text(content)
+    assert main(["report", str(template), "--out", str(page)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "does not say that gensig report wrote it" in said
+    assert page.read_text() == content
+
+
+def test_a_link_is_kept_even_to_a_page(made, tmp_path):
+    target, link = tmp_path / "target.html", tmp_path / "link.html"
+    target.write_text(made[1].text, encoding="utf-8")
+    link.symlink_to(target)
+    with pytest.raises(ConfigError, match="remove it"):
+        write_report(made[0], link)
+    assert target.read_text(encoding="utf-8") == made[1].text
 
 
 @pytest.mark.parametrize(
