@@ -80,31 +80,41 @@ def load_faults(
 
 
 def generate(
-    *overrides: str, out: str | Path, config_dir: str | Path | None = None
+    *overrides: str,
+    out: str | Path,
+    config_dir: str | Path | None = None,
+    workers: int | None = None,
+    progress: bool = True,
+    reuse: bool = False,
 ) -> Dataset:
     """Make a data set and open it.
 
+    Parameters
+    ----------
+    overrides : ``group=option`` and ``key=value``, as for ``gensig generate``
+    out : folder that does not exist or is empty
+    config_dir : folder with options of your own
+    workers : processes of this machine; None takes the executor of the overrides, by default a
+            process for each core
+    progress : shows the records that are made: a bar on a terminal and in notebooks, elsewhere a
+            line every few seconds on stderr
+    reuse : opens ``out`` where it is this data set already, and finishes it where it is incomplete
+
     Raises
     ------
-    gensig.errors.GensigError    for anything that cannot be used, and for a shard that fails
+    gensig.errors.GensigError    for anything that cannot be used, for a shard that fails, and with
+            ``reuse`` for a folder that is another data set
     """
-    from gensig.errors import ConfigError, SimulationError
-    from gensig.execution.registry import read_executor
-    from gensig.plan.request import read_request
-    from gensig.production.folder import begin_folder, run_folder
+    from gensig.production.making import make_folder
 
-    request = read_request(overrides, config_dir=config_dir)
-    executor = read_executor(request.config["executor"])
-    if not executor.closes:
-        raise ConfigError(
-            "a task of an array job makes its share of a folder only; run it as `gensig generate`"
-        )
-    begin_folder(request.config, request.overrides, Path(out))
-    _, problems = run_folder(
-        Path(out), executor=executor, on_shard=lambda _progress: None
+    make_folder(
+        overrides,
+        Path(out),
+        config_dir=config_dir,
+        workers=workers,
+        progress=progress,
+        reuse=reuse,
     )
-    if problems:
-        raise SimulationError(f"{out} is incomplete: {problems[0]}")
     return open_dataset(out)
 
 

@@ -61,10 +61,12 @@ def _run_verb(name: str, words: list[str]) -> int:
         arguments = verb_parser(name).parse_intermixed_args(words)
     except SystemExit as leaving:
         return int(leaving.code or 0)
-    from gensig.commands.console import one_line_warnings
+    from gensig.commands.console import one_line_warnings, step
+    from gensig.compilation import on_compilation
+    from gensig.terminal.run_progress import COMPILING
 
     module, function = verb.runs.split(":")
-    with one_line_warnings(PROGRAM):
+    with one_line_warnings(PROGRAM), on_compilation(lambda: step(COMPILING)):
         status = int(getattr(importlib.import_module(module), function)(arguments))
     if verb.instead is not None:
         from gensig.commands.request import print_unread

@@ -4,7 +4,7 @@ import os
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -19,7 +19,15 @@ from gensig.dataset.folder.layout import (
 )
 from gensig.dataset.plan import Plan, read_plan
 from gensig.dataset.schema import SCALES, bulk_signals, signal_column
-from gensig.dataset.selection import Selection, StoredRecord, structured, unknown_name
+from gensig.dataset.selection import (
+    Records,
+    Selection,
+    StoredRecord,
+    record_number,
+    record_numbers,
+    structured,
+    unknown_name,
+)
 from gensig.dataset.splitting.protocols import NEW_MACHINE, PROTOCOLS, why_left_out
 from gensig.dataset.splitting.splits import SUBSETS, SplitTable, read_split
 from gensig.dataset.storage.attributes import HDF5_ERRORS, read_attributes
@@ -34,6 +42,9 @@ from gensig.dataset.storage.guard import (
 )
 from gensig.dataset.storage.quantization import read_signal
 from gensig.errors import DatasetError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 MAX_OPEN_SHARDS = 64
 
@@ -225,22 +236,55 @@ class Dataset:
 
     def signals(
         self,
-        record_index: int,
+        records: Records,
         start: int = 0,
         stop: int | None = None,
         channels: Sequence[int | str] | None = None,
         *,
         name: str = "acceleration",
     ) -> np.ndarray:
-        """Acceleration of one record, (channel, sample) float32 in m/s^2, however it is stored.
+        """Acceleration in m/s^2, float32 however it is stored.
 
         Parameters
         ----------
-        record_index : int     0 to n_records - 1, in plan order
-        start, stop : int      samples, stop exclusive; None is the end
-        channels : sequence    names or numbers; None is all, in their order
-        name : str             'acceleration', 'acceleration_clean' or 'healthy_twin'
+        records : one record by its number in the plan's order or its id, or several by a slice, a
+            list of numbers or ids, or (record,) bool
+        start, stop : samples, stop exclusive; None is the end
+        channels : names or numbers; None is all, in their order
+        name : 'acceleration', 'acceleration_clean' or 'healthy_twin'
+
+        Returns
+        -------
+        (channel, sample) of one record, (record, channel, sample) of several
+
+        Raises
+        ------
+        DatasetError    for records, samples, channels and signals that do not exist, and for a
+                        shard that cannot be read
         """
+        if isinstance(records, int | np.integer):
+            return self._signal(int(records), start, stop, channels, name)
+        ids = self.plan.columns["record_id"]
+        if isinstance(records, str):
+            number = record_number(records, ids, self.folder)
+            return self._signal(number, start, stop, channels, name)
+        numbers = record_numbers(records, ids, self.folder)
+        n_channels = len(self.channel_names if channels is None else channels)
+        last = self.n_samples if stop is None else stop
+        block = np.empty((len(numbers), n_channels, max(0, last - start)), np.float32)
+        for row, number in enumerate(numbers):
+            block[row] = self._signal(number, start, stop, channels, name)
+        return block
+
+    def _signal(
+        self,
+        record_index: int,
+        start: int,
+        stop: int | None,
+        channels: Sequence[int | str] | None,
+        name: str,
+    ) -> np.ndarray:
+        """Acceleration of one record, (channel, sample)."""
         known = [known for known in self.signal_names if known in SCALES]
         if name not in known:
             raise unknown_name("signal", name, known, self.folder)
@@ -322,6 +366,10 @@ class Dataset:
         >>> data.where(fault="crack", speed_rpm=(1000, 2000), status="ok")    # doctest: +SKIP
         """
         return Selection(self, np.arange(self.n_records)).where(**conditions)
+
+    def to_pandas(self, names: Sequence[str] | None = None) -> "DataFrame":
+        """Columns as a data frame of pandas, a row a record; see `Selection.to_pandas`."""
+        return self.where().to_pandas(names)
 
     @property
     def left_out(self) -> dict[str, str]:

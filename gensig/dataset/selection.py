@@ -6,13 +6,19 @@ import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from gensig.dataset.plan import Plan
 from gensig.dataset.schema import PARAMS
 from gensig.errors import DatasetError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+# One record by number or id, or several by a slice, a list of them, or True for each chosen one.
+Records = int | str | slice | Sequence[int | str] | np.ndarray
 
 # Short names for columns.
 ALIASES = {"fault": "label_name"}
@@ -44,12 +50,12 @@ class RecordSource(Protocol):
 
     def signals(
         self,
-        index: int,
+        records: Records,
         start: int = 0,
         stop: int | None = None,
         channels: Sequence[int | str] | None = None,
     ) -> np.ndarray:
-        """Acceleration of one record, (channel, sample) float32 in m/s^2."""
+        """Acceleration of one record or of several, see `Dataset.signals`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -100,10 +106,20 @@ class Selection:
         return self.dataset.column(name)[self.index]
 
     def signals(
-        self, number: int, start: int = 0, stop: int | None = None, **options: Any
+        self, records: Records, start: int = 0, stop: int | None = None, **options: Any
     ) -> np.ndarray:
-        """Acceleration of one record by its number here, (channel, sample) float32 in m/s^2."""
-        return self.dataset.signals(self._record(number), start, stop, **options)
+        """Acceleration in m/s^2 as `Dataset.signals`; numbers and slices count these records."""
+        if isinstance(records, str):
+            return self.dataset.signals(records, start, stop, **options)
+        if isinstance(records, int | np.integer):
+            return self.dataset.signals(self._record(records), start, stop, **options)
+        if not isinstance(records, slice):
+            chosen = [
+                record if isinstance(record, str) else self._record(record)
+                for record in _chosen(records)
+            ]
+            return self.dataset.signals(chosen, start, stop, **options)
+        return self.dataset.signals(self.index[records], start, stop, **options)
 
     def array(
         self,
@@ -137,6 +153,39 @@ class Selection:
             columns = {name: part for name, part in columns.items() if part.ndim == 1}
         return structured(columns)
 
+    def to_pandas(self, names: Sequence[str] | None = None) -> DataFrame:
+        """Columns as a data frame of pandas, a row a record; its index is the record's number.
+
+        Parameters
+        ----------
+        names : columns; None takes all those with one value a record
+
+        Raises
+        ------
+        DatasetError    where pandas is not installed, and for a column that does not exist or
+                        holds several values a record
+        """
+        try:
+            import pandas
+        except ImportError as error:
+            raise DatasetError(
+                "to_pandas needs the package pandas; pip install 'gensig[pandas]'"
+            ) from error
+        columns = {
+            name: self.column(name) for name in names or self.dataset.column_names
+        }
+        vectors = [name for name, values in columns.items() if values.ndim > 1]
+        if names is not None and vectors:
+            raise DatasetError(
+                f"column {vectors[0]!r} holds several values a record; read it with column()"
+            )
+        plain = {name: columns[name] for name in columns if name not in vectors}
+        texts = {
+            name: values.astype(object) if values.dtype.kind == "U" else values
+            for name, values in plain.items()
+        }
+        return pandas.DataFrame(texts, index=pandas.Index(self.index, name="record"))
+
     def __len__(self) -> int:
         return len(self.index)
 
@@ -163,6 +212,46 @@ class Selection:
         if not -len(self.index) <= number < len(self.index):
             raise IndexError(f"record {number} of a selection of {len(self.index)}")
         return int(self.index[number])
+
+
+def _chosen(records: Sequence[int | str] | np.ndarray) -> list[Any]:
+    """Numbers and ids of several records; True at a place chooses that number."""
+    values = np.asarray(records)
+    if values.dtype == bool:
+        return np.flatnonzero(values).tolist()
+    return list(records)
+
+
+def record_numbers(
+    records: slice | Sequence[int | str] | np.ndarray, ids: np.ndarray, folder: Path
+) -> list[int]:
+    """Numbers of several records of a data set; ``ids`` (record,) are those of all.
+
+    Raises
+    ------
+    DatasetError    for an id that does not exist, and for anything that is neither number nor id
+    """
+    if isinstance(records, slice):
+        return list(range(*records.indices(len(ids))))
+    if np.asarray(records).dtype == bool and len(records) != len(ids):
+        raise DatasetError(
+            f"{len(records)} values of True and False for {len(ids)} records: give one a record"
+        )
+    return [record_number(record, ids, folder) for record in _chosen(records)]
+
+
+def record_number(record: Any, ids: np.ndarray, folder: Path) -> int:
+    """Number of one record by its number or id."""
+    if isinstance(record, str):
+        places = np.flatnonzero(ids == record)
+        if not places.size:
+            raise unknown_name("record", record, ids[:200].tolist(), folder)
+        return int(places[0])
+    if isinstance(record, bool) or not isinstance(record, int | np.integer):
+        raise DatasetError(
+            f"record {record!r}: give a number, an id, a slice, or a list of numbers or ids"
+        )
+    return int(record)
 
 
 def structured(columns: Mapping[str, np.ndarray]) -> np.ndarray:

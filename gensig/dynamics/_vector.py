@@ -26,8 +26,10 @@ from numba.core.typing.templates import ConcreteTemplate, infer_global, signatur
 from numba.extending import lower_builtin, models, register_model
 from numpy.typing import NDArray
 
+from gensig.compilation import watch
 from gensig.dynamics._written import OPERATIONS, intrinsic, written
 
+watch()
 PRECISIONS = ("float64", "float32")
 GROUP_BYTES = 64
 FOUR = 4

@@ -11,6 +11,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from gensig.compilation import watch
+
+watch()
 _compiled: Any = functools.partial(njit, nogil=True, cache=True, error_model="numpy")()
 
 ROUNDS = 40  # at most, of the logarithm's load: each leaves about a tenth of the error

@@ -6,10 +6,12 @@ import dataclasses
 import functools
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gensig.compilation import on_compilation
 from gensig.dataset.columns import GEAR_NAMES, GEAR_PINION_TURNS, GEAR_TEETH
 from gensig.dataset.folder.beginning import create_folder
 from gensig.dataset.folder.failures import commonest, failure_reasons
@@ -32,6 +34,7 @@ from gensig.dataset.storage.receipts import (
     write_receipt,
 )
 from gensig.dataset.storage.shard import ShardWriter
+from gensig.dynamics.backends.registry import IMPLICIT_BACKEND
 from gensig.dynamics.decimation import usable_band
 from gensig.dynamics.integrator import records_together
 from gensig.errors import ConfigError, DatasetError
@@ -39,6 +42,7 @@ from gensig.execution.base import Executor, ShardFailure
 from gensig.life.life_options import runs_to_failure
 from gensig.options.configuration import Configuration
 from gensig.plan.make import make_plan
+from gensig.production.record_counts import RecordCounts
 from gensig.record.gear_columns import gear_columns
 from gensig.record.machines import read_machine
 from gensig.record.options import (
@@ -48,28 +52,9 @@ from gensig.record.options import (
 )
 from gensig.record.simulate import finished_records, signal_shapes
 from gensig.systems.base import Machine
+from gensig.terminal.run_progress import Progress
 from gensig.units import channel_unit
 from gensig.version import __version__
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Progress:
-    """State of a run after a shard is finished or given up.
-
-    Parameters
-    ----------
-    n_done, n_records : int    records on disk, of all that are planned
-    n_failed : int             records among `n_done` whose simulation failed
-    n_made, n_bytes : int      records and bytes that this run has made
-    reason : str               why this shard could not be made; empty when it was
-    """
-
-    n_done: int
-    n_records: int
-    n_failed: int
-    n_made: int
-    n_bytes: int
-    reason: str
 
 
 def begin_folder(config: Configuration, overrides: Sequence[str], out: Path) -> Plan:
@@ -100,12 +85,44 @@ def begin_folder(config: Configuration, overrides: Sequence[str], out: Path) -> 
     return plan
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WrittenShard:
+    """Digest, size and number of failed records of a shard on disk."""
+
+    sha256: str
+    n_bytes: int
+    n_failed: int
+
+
+@dataclass(slots=True, kw_only=True)
+class _Tally:
+    """Records of a run: those on disk, and those that it made."""
+
+    n_records: int
+    n_done: int
+    n_failed: int
+    n_made: int = 0
+    n_bytes: int = 0
+
+    def add(self, n_records: int, shard: WrittenShard) -> None:
+        """Count a shard that was made."""
+        self.n_done += n_records
+        self.n_made += n_records
+        self.n_failed += shard.n_failed
+        self.n_bytes += shard.n_bytes
+
+    def progress(self, reason: str = "") -> Progress:
+        """The state after a shard; ``reason`` says why it could not be made."""
+        return Progress(**dataclasses.asdict(self), reason=reason)
+
+
 def run_folder(
     out: Path,
     *,
     executor: Executor,
     on_shard: Callable[[Progress], None],
     asked: Configuration | None = None,
+    counts: RecordCounts | None = None,
 ) -> tuple[int, list[str]]:
     """Make the shards that a folder still lacks, then close it.
 
@@ -114,7 +131,8 @@ def run_folder(
     Parameters
     ----------
     executor : where the shards are made; it decides no bit
-    on_shard : called for every shard that is finished or could not be made
+    on_shard : called at the beginning, and for every shard that is finished or could not be made
+    counts : takes the records of shards at work
     asked : a configuration that must agree with the folder's in all that decides bits
 
     Returns
@@ -136,52 +154,63 @@ def run_folder(
     if not executor.closes:
         entries |= _receipts(out, mine)
     missing = [index for index in mine if not _is_there(out, index, entries[index])]
-    n_records = sum(rows[index] for index in mine)
-    n_done = n_records - sum(rows[index] for index in missing)
-    n_failed = sum(entries[index].n_failed for index in mine if index not in missing)
+    done = [index for index in mine if index not in missing]
+    tally = _Tally(
+        n_records=sum(rows[index] for index in mine),
+        n_done=sum(rows[index] for index in done),
+        n_failed=sum(entries[index].n_failed for index in done),
+    )
     problems: list[str] = []
-    n_made, n_bytes = 0, 0
     # The log of a closed folder is closed too.
     logged = executor.closes and not manifest.is_complete
     if logged:
         n_missing = f"{len(missing)} of {len(mine)} shards to make"
         log(out, f"gensig {__version__}, {executor}: {n_missing}")
+    on_shard(tally.progress())
+    job = functools.partial(write_shard, out, counts=counts)
     try:
-        for index, result in executor.run(functools.partial(write_shard, out), missing):
-            if isinstance(result, ShardFailure):
-                reason = f"shard {index}: {result.reason}"
+        for index, result in executor.run(job, missing):
+            if counts is not None:
+                counts.set(index, 0)
+            reason = _recorded(out, index, result, rows[index], closes=executor.closes)
+            if reason:
                 problems.append(reason)
-                if executor.closes:
-                    record_failed_shard(out, index)
-                    log(out, f"{reason}; not made")
-            else:
-                reason = ""
-                n_done, n_failed = n_done + rows[index], n_failed + result.n_failed
-                n_made, n_bytes = n_made + rows[index], n_bytes + result.n_bytes
-                if executor.closes:
-                    record_shard(
-                        out, index, result.sha256, result.n_bytes, result.n_failed
-                    )
-                    receipt_path(out, index).unlink(missing_ok=True)
-                    sizes = f"{result.n_failed} failed, {result.n_bytes} bytes"
-                    log(out, f"shard {index}: {rows[index]} records, {sizes}")
-            on_shard(
-                Progress(
-                    n_done=n_done,
-                    n_records=n_records,
-                    n_failed=n_failed,
-                    n_made=n_made,
-                    n_bytes=n_bytes,
-                    reason=reason,
-                )
-            )
+            if isinstance(result, WrittenShard):
+                tally.add(rows[index], result)
+            on_shard(tally.progress(reason))
     except BaseException as error:
         if logged:
             log(out, f"ended by {type(error).__name__}: {error}")
         raise
     if logged and not problems:
         _close(out)
-    return n_failed, problems
+    return tally.n_failed, problems
+
+
+def _recorded(
+    out: Path,
+    index: int,
+    result: WrittenShard | ShardFailure,
+    n_records: int,
+    *,
+    closes: bool,
+) -> str:
+    """Enter a shard in manifest and log; returns the reason why it could not be made, or ''.
+
+    A task of an array job enters nothing: ``gensig finalize`` does.
+    """
+    if isinstance(result, ShardFailure):
+        reason = f"shard {index}: {result.reason}"
+        if closes:
+            record_failed_shard(out, index)
+            log(out, f"{reason}; not made")
+        return reason
+    if closes:
+        record_shard(out, index, result.sha256, result.n_bytes, result.n_failed)
+        receipt_path(out, index).unlink(missing_ok=True)
+        sizes = f"{result.n_failed} failed, {result.n_bytes} bytes"
+        log(out, f"shard {index}: {n_records} records, {sizes}")
+    return ""
 
 
 def _close(out: Path) -> None:
@@ -221,21 +250,18 @@ def close_folder(out: Path) -> int:
     return read_manifest(out).n_failed
 
 
-# records simulated and written at a time, and bytes of their samples
-MOST_BLOCK, BLOCK_BYTES = 64, 2**27
+# records simulated and written at a time, and bytes of their samples; larger blocks are no faster
+MOST_BLOCK, BLOCK_BYTES = 16, 2**27
+# the same by the implicit method, which takes seconds a record
+IMPLICIT_BLOCK = 4
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WrittenShard:
-    """Digest, size and number of failed records of a shard on disk."""
-
-    sha256: str
-    n_bytes: int
-    n_failed: int
-
-
-def write_shard(out: Path, shard_index: int) -> WrittenShard:
+def write_shard(
+    out: Path, shard_index: int, *, counts: RecordCounts | None = None
+) -> WrittenShard:
     """Simulate and write one shard; its bits depend only on the folder's plan and configuration.
+
+    ``counts`` takes the records that are written.
 
     Raises
     ------
@@ -250,17 +276,25 @@ def write_shard(out: Path, shard_index: int) -> WrittenShard:
     ]
     writer = open_shard(shard_path(out, shard_index), config, n_records, params)
     together = block_length(config)
-    with writer:
+    with writer, _compilation_told(counts):
         for first in range(0, n_records, together):
             rows = plan.records(begin + first, min(together, n_records - first))
             _check_rows(out, rows, shard_index, first)
             for row, record in enumerate(finished_records(config, rows), start=first):
                 writer.write(row, record.signals, record.values)
+                if counts is not None:
+                    counts.set(shard_index, row + 1)
     written = WrittenShard(
         sha256=writer.sha256, n_bytes=writer.n_bytes, n_failed=writer.n_failed
     )
     write_receipt(out, shard_index, rows=n_records, **dataclasses.asdict(written))
     return written
+
+
+def _compilation_told(counts: RecordCounts | None) -> AbstractContextManager[None]:
+    if counts is None:
+        return nullcontext()
+    return on_compilation(counts.compiling)
 
 
 @functools.lru_cache(maxsize=1)
@@ -297,7 +331,10 @@ def block_length(config: Configuration) -> int:
         * len(system.sensing.channels)
         * round(system.operating.duration * system.sensing.sampling_rate)
     )
-    return max(records_together(system.solver), min(MOST_BLOCK, BLOCK_BYTES // n_bytes))
+    most = MOST_BLOCK
+    if system.solver.backend == IMPLICIT_BACKEND:
+        most = IMPLICIT_BLOCK
+    return max(records_together(system.solver), min(most, BLOCK_BYTES // n_bytes))
 
 
 def open_shard(

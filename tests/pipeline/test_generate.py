@@ -6,6 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import gensig
+import gensig.errors
 from gensig.cli import main
 from gensig.dataset.folder.manifest import read_manifest
 from gensig.dataset.folder.verify import verify
@@ -81,3 +82,45 @@ def test_multirun_makes_one_data_set_each(tmp_path):
     for name in folders:
         with gensig.open_dataset(tmp_path / name) as data:
             assert data.class_names == [name.partition("=")[2]]
+
+
+def test_python_makes_the_same_bits_with_workers_and_shows_progress(
+    reference, tmp_path, capsys
+):
+    words = [word for word in SMALL if not word.startswith("executor")]
+    with gensig.generate(*words, out=tmp_path / "a", workers=1) as data:
+        assert data.n_records == 8
+    assert "8 of 8 records" in capsys.readouterr().err
+    two = ("dataset.records_per_shard=4",)
+    gensig.generate(*words, *two, out=tmp_path / "b", workers=2, progress=False)
+    assert capsys.readouterr().err == ""
+    for name in "ab":
+        assert signals(tmp_path / name).tobytes() == signals(reference).tobytes()
+    with pytest.raises(gensig.errors.ConfigError, match="n_workers = 0 must be"):
+        gensig.generate(*words, out=tmp_path / "c", workers=0)
+
+
+def test_python_reuses_and_finishes_the_same_data_set_only(
+    reference, tmp_path, monkeypatch
+):
+    words, quiet = [*SMALL, "dataset.records_per_shard=2"], {"progress": False}
+    out = tmp_path / "data"
+    frozen = ["plan", "--freeze", *words, f"out={out}"]
+    assert main(frozen) == 0
+    with gensig.generate(*words, out=out, reuse=True, **quiet) as data:
+        assert data.manifest.is_complete
+    assert signals(out).tobytes() == signals(reference).tobytes()
+    before = {path: path.stat().st_mtime_ns for path in out.rglob("*.h5")}
+    gensig.generate(*words, out=out, reuse=True, **quiet).close()
+    assert {path: path.stat().st_mtime_ns for path in out.rglob("*.h5")} == before
+    with pytest.raises(gensig.errors.DatasetError, match="begun with another seed"):
+        gensig.generate(*words, "seed=5", out=out, reuse=True, **quiet)
+    with pytest.raises(gensig.errors.DatasetError):
+        gensig.generate(*words, out=out, **quiet)
+
+
+def test_python_warns_of_a_plan_without_sense(tmp_path):
+    with pytest.warns(UserWarning, match="root of the teeth has"):
+        gensig.generate(
+            *SMALL, "operating.torque_nm=400", out=tmp_path / "data", progress=False
+        )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import yaml
 
-from gensig.commands.console import ShardProgress, note, remark, step
+from gensig.commands.console import note, remark, step
 from gensig.dataset.folder.beginning import refuse_used
 from gensig.dataset.folder.failures import commonest, failure_reasons
 from gensig.dataset.folder.joining import joined_folder
@@ -21,6 +21,7 @@ from gensig.errors import ConfigError
 from gensig.options.compose import job_folders, override_keys, sweep
 from gensig.options.configuration import Configuration
 from gensig.plan.request import Request, read_request
+from gensig.terminal.run_progress import RunProgress
 
 if TYPE_CHECKING:
     from gensig.dataset.plan import Plan
@@ -82,7 +83,6 @@ def _generate(
         executor,
         arguments,
         n_records=n_records,
-        n_shards=n_shards,
         begin=begin,
     )
 
@@ -103,7 +103,6 @@ def _generate_share(executor: Executor, arguments: Namespace) -> int:
         executor,
         arguments,
         n_records=sum(manifest.shards[index].rows for index in mine),
-        n_shards=len(mine),
         begin=begin,
         asked=_asked(out, arguments.overrides, arguments.config_dir),
         of_task=True,
@@ -116,13 +115,13 @@ def _run(
     arguments: Namespace,
     *,
     n_records: int,
-    n_shards: int,
     begin: float,
     asked: Configuration | None = None,
     of_task: bool = False,
 ) -> int:
     """Make the shards that a folder, or a task's share of it, lacks; returns the exit status."""
     from gensig.production.folder import run_folder
+    from gensig.production.record_counts import record_counts
 
     advice = f"{out} is incomplete; gensig resume {out} tries the missing shards again"
     records = f"{n_records} records"
@@ -131,14 +130,14 @@ def _run(
         advice = "this task's share is incomplete; the same command tries again"
         records += " of this task"
         following = f"gensig finalize {out}"
-    with ShardProgress(
-        quiet=arguments.quiet,
-        n_records=n_records,
-        n_shards=n_shards,
-        n_at_work=executor.n_processes,
-    ) as progress:
+    with (
+        record_counts(len(read_manifest(out).shards)) as counts,
+        RunProgress(
+            quiet=arguments.quiet, n_records=n_records, counts=counts
+        ) as progress,
+    ):
         n_failed, problems = run_folder(
-            out, executor=executor, on_shard=progress, asked=asked
+            out, executor=executor, on_shard=progress, asked=asked, counts=counts
         )
     for problem in problems:
         remark(problem)
@@ -210,7 +209,6 @@ def resume(arguments: Namespace) -> int:
         executor,
         arguments,
         n_records=manifest.n_records,
-        n_shards=len(manifest.shards) - manifest.n_done,
         begin=time.monotonic(),
         asked=asked,
     )

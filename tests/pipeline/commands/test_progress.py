@@ -1,28 +1,30 @@
 """Reports of a run: a bar on a terminal, lines elsewhere, nothing when quiet, always a log."""
 
 import os
+import pickle
 import pty
 import re
 import subprocess
 import sys
 import time
+from dataclasses import dataclass, replace
 
 import pytest
 from small_sets import TINY
 
 from gensig.cli import main
-from gensig.commands import console
-from gensig.commands.console import ShardProgress
 from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.storage.checksums import read_checksums
 from gensig.execution.local import LocalExecutor
-from gensig.production.folder import Progress, run_folder
+from gensig.production.folder import run_folder, write_shard
+from gensig.production.record_counts import RecordCounts, record_counts
+from gensig.terminal import run_progress
+from gensig.terminal.run_progress import COMPILING, Progress, RunProgress
 
 STATE = Progress(
     n_done=60, n_records=100, n_failed=2, n_made=40, n_bytes=8_000_000, reason=""
 )
-COMPILES = "the first run compiles for up to a minute"
 
 
 @pytest.fixture
@@ -31,48 +33,117 @@ def data(tiny_set, tmp_path):
     return tiny_set.copy_to(tmp_path / "data")
 
 
-def quiet_progress(n_at_work=2, n_shards=1):
-    return ShardProgress(
-        quiet=True, n_records=100, n_shards=n_shards, n_at_work=n_at_work
-    )
+@dataclass
+class FakeCounts:
+    """Records of shards at work, as a test says."""
+
+    n_made: int = 0
+    is_compiling: bool = False
 
 
-def test_lines_come_every_few_seconds_even_before_a_shard(monkeypatch, capsys):
-    monkeypatch.setattr(console, "LINE_SECONDS", 0.03)
-    progress = ShardProgress(quiet=False, n_records=100, n_shards=17, n_at_work=3)
+def quiet_progress(counts=None):
+    return RunProgress(quiet=True, n_records=100, counts=counts)
+
+
+def test_lines_come_every_few_seconds_and_count_records_of_shards_at_work(
+    monkeypatch, capsys
+):
+    monkeypatch.setattr(run_progress, "LINE_SECONDS", 0.03)
+    counts = FakeCounts(is_compiling=True)
+    progress = RunProgress(quiet=False, n_records=100, counts=counts)
     with progress:
         time.sleep(0.12)
         before = capsys.readouterr().err.splitlines()
+        counts.n_made = 7
+        time.sleep(0.12)
+        at_work = capsys.readouterr().err.splitlines()
+        counts.n_made = 0
         progress(STATE)
         time.sleep(0.12)
     after = capsys.readouterr().err.splitlines()
-    waiting = "0 of 100 records, 0 s; 3 of 17 shards at work, counted when whole"
     assert len(before) >= 2
-    assert set(before) == {waiting}
+    assert set(before) == {f"0 of 100 records, 0 s; {COMPILING}"}
+    assert len(at_work) >= 2
+    assert all(re.match(r"7 of 100 records, [0-9.]+ records/s, ", x) for x in at_work)
     running = r"60 of 100 records, [0-9.]+ records/s, 8\.0 MB, 0 s left, 2 failed"
     assert len(after) >= 2
     assert all(re.fullmatch(running, line) for line in after)
 
 
 def test_rate_and_time_left_are_those_of_this_run():
-    """Records that existed before a resume were not made by this run."""
+    """Records that existed before a resume were not made by this run, nor while it compiled."""
+    counts = FakeCounts()
+    progress = quiet_progress(counts)
+    progress(replace(STATE, n_done=20, n_made=0, n_bytes=0, n_failed=0))
+    progress._begin -= 30.0
+    assert progress.facts() == "30 s"
+    counts.n_made = 10
+    assert progress.facts() == "0.3 records/s, 3 min 30 s left"
+    progress._first = progress._first[0] - 5.0, 10
+    counts.n_made = 34
+    assert progress.facts() == "4.8 records/s, 10 s left"
+    counts.n_made = 0
+    progress(replace(STATE, n_done=70, n_made=50))
+    assert progress.facts() == "8.0 records/s, 8.0 MB, 4 s left, 2 failed"
+
+
+def test_without_counts_a_record_counts_with_its_shard():
     progress = quiet_progress()
-    waiting = "1 of 1 shards at work, counted when whole"
-    assert progress.facts() == f"0 s; {waiting}"
     progress._begin -= 20.0
-    assert progress.facts() == f"20 s; {waiting}; {COMPILES}"
     progress(STATE)
     assert progress.facts() == "2.0 records/s, 8.0 MB, 20 s left, 2 failed"
-    progress._last_time -= 5.0  # nothing came since
-    progress._begin -= 5.0
-    assert progress.facts() == "2.0 records/s, 8.0 MB, 15 s left, 2 failed"
+
+
+def test_workers_tell_their_records_and_their_compiling():
+    with record_counts(3) as counts:
+        assert (counts.n_made, counts.is_compiling) == (0, False)
+        seen = pickle.loads(pickle.dumps(counts))
+        seen.set(0, 4)
+        seen.set(2, 5)
+        seen.compiling()
+        assert (counts.n_made, counts.is_compiling) == (9, True)
+        counts.set(0, 0)
+        assert counts.n_made == 5
+    seen.set(1, 3)  # a worker that outlives the run, or does not see the file
+    assert not counts.path.exists()
+
+
+def test_records_are_counted_while_a_shard_is_made(tmp_path):
+    out = tmp_path / "data"
+    words = [*TINY, "dataset.records_per_shard=6", f"out={out}"]
+    assert main(["plan", "--freeze", *words]) == 0
+    seen = []
+
+    class Counts(RecordCounts):
+        def set(self, shard, n_records):
+            seen.append((shard, n_records))
+
+    counts = Counts(path=tmp_path / "none", n_shards=1)
+    write_shard(out, 0, counts=counts)
+    assert seen == [(0, n) for n in range(1, 7)]
+
+
+def test_compiling_is_told_once(monkeypatch, tmp_path):
+    """In a process with an empty cache, for the first kernel only."""
+    code = (
+        "import gensig.compilation as c, numba, sys; c.watch(); told = []\n"
+        "f = numba.njit(lambda x: x + 1); g = numba.njit(lambda x: x + 2)\n"
+        "with c.on_compilation(lambda: told.append(1)):\n"
+        "    f(1); f(1.0); g(1)\n"
+        "f(1j)\n"
+        "print(len(told))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "1\n"
 
 
 @pytest.mark.parametrize(
     ("seconds", "text"), [(59.4, "59 s"), (190.0, "3 min 10 s"), (7500.0, "2 h 5 min")]
 )
 def test_durations_are_read_by_people(seconds, text):
-    assert console._duration(seconds) == text
+    assert run_progress._duration(seconds) == text
 
 
 def test_a_terminal_shows_a_bar_with_rate_bytes_and_time_left(tmp_path):
@@ -117,12 +188,13 @@ def test_the_log_tells_what_happened_and_is_closed_with_the_set(data):
 
 
 def test_the_log_tells_of_a_run_that_ended_early(tmp_path, monkeypatch, capsys):
-    def interrupt(_progress, _state):
-        raise KeyboardInterrupt
+    def interrupt(_progress, state):
+        if state.n_made:
+            raise KeyboardInterrupt
 
     out = tmp_path / "data"
     with monkeypatch.context() as patch:
-        patch.setattr(ShardProgress, "__call__", interrupt)
+        patch.setattr(RunProgress, "__call__", interrupt)
         words = ["--quiet", *TINY, "executor.n_workers=1", f"out={out}"]
         assert main(["generate", *words]) == 130
     last = (out / "run.log").read_text().splitlines()[-1]

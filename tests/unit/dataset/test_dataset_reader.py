@@ -1,6 +1,7 @@
 """Reading of data sets in plan order, from several processes, finished or not."""
 
 import pickle
+import sys
 
 import numpy as np
 import pytest
@@ -43,6 +44,74 @@ def test_columns_and_signals_come_in_plan_order(data, plan):
         assert_array_equal(part, expected[1:, 20:70])
         turned = data.signals(index, channels=[1, 0])
         assert_array_equal(turned, expected[::-1])
+
+
+def test_signals_of_several_records_come_together(data, plan):
+    one = [data.signals(index) for index in range(data.n_records)]
+    ids = plan.columns["record_id"].tolist()
+    assert_array_equal(data.signals(ids[7]), one[7], strict=True)
+    chosen = {
+        "list": ([30, 2, 2], [30, 2, 2]),
+        "ids": ([ids[9], ids[35]], [9, 35]),
+        "both": ([ids[9], 3], [9, 3]),
+        "array": (np.array([11, 0]), [11, 0]),
+        "slice": (slice(3, 30, 9), [3, 12, 21]),
+        "last": (slice(-2, None), [34, 35]),
+        "none": ([], []),
+        "mask": (data.column("label") == 2, np.flatnonzero(data.column("label") == 2)),
+    }
+    for records, numbers in chosen.values():
+        expected = np.array([one[number] for number in numbers]).reshape(-1, 2, 200)
+        assert_array_equal(data.signals(records), expected)
+    part = data.signals([4, 5], 20, 70, ["wheel_ü"])
+    assert_array_equal(part, np.stack(one[4:6])[:, 1:, 20:70], strict=True)
+
+
+def test_signals_of_a_selection_count_its_records(data):
+    cracked = data.where(label=1)
+    numbers = cracked.index.tolist()
+    assert_array_equal(cracked.signals(slice(1, 3)), data.signals(numbers[1:3]))
+    assert_array_equal(cracked.signals([2, 0]), data.signals([numbers[2], numbers[0]]))
+    assert_array_equal(cracked.signals(-1), data.signals(numbers[-1]))
+    name = cracked.column("record_id")[3]
+    assert_array_equal(cracked.signals(str(name)), cracked.signals(3))
+
+
+@pytest.mark.parametrize(
+    ("records", "message"),
+    [
+        ("r99", "record 'r99' does not exist"),
+        (["r99"], "record 'r99' does not exist"),
+        ([0, 36], "record 36 does not exist; .* has 0 to 35"),
+        ([0.5], "record 0.5: give a number, an id, a slice, or a list"),
+        (np.array([True, False]), "2 values of True and False for 36 records"),
+    ],
+)
+def test_records_that_do_not_exist_are_named(data, records, message):
+    with pytest.raises(DatasetError, match=message):
+        data.signals(records)
+
+
+def test_a_data_frame_has_the_columns_and_the_numbers_of_the_records(data):
+    frame = data.to_pandas()
+    plain = [name for name in data.column_names if data.column(name).ndim == 1]
+    assert frame.columns.tolist() == plain
+    for name in plain:
+        assert_array_equal(frame[name].to_numpy(), data.column(name))
+    assert all(isinstance(name, str) for name in frame["label_name"])
+    part = data.where(label=2).to_pandas(["label_name", "params/crack_depth_mm"])
+    assert part.index.tolist() == data.where(label=2).index.tolist()
+    assert part.columns.tolist() == ["label_name", "params/crack_depth_mm"]
+    with pytest.raises(
+        DatasetError, match="'noise_power' holds several values a record"
+    ):
+        data.to_pandas(["noise_power"])
+
+
+def test_without_pandas_it_says_what_to_install(data, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(DatasetError, match=r"pip install 'gensig\[pandas\]'"):
+        data.to_pandas()
 
 
 def test_few_files_stay_open(data, monkeypatch):

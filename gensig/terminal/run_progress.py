@@ -1,0 +1,199 @@
+"""Progress of a long run: a bar on a terminal and in notebooks, elsewhere a line at times."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+LINE_SECONDS = 5.0
+COMPILING = "compiling, once on this machine: up to half a minute"
+
+
+class Counts(Protocol):
+    """Records of shards at work, and whether a worker compiles."""
+
+    @property
+    def n_made(self) -> int:
+        """Records of all shards at work."""
+
+    @property
+    def is_compiling(self) -> bool:
+        """True from the first compilation on."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Progress:
+    """State of a run at its beginning, and after every shard that is finished or given up.
+
+    Parameters
+    ----------
+    n_done, n_records : int    records on disk, of all that are planned
+    n_failed : int             records among `n_done` whose simulation failed
+    n_made, n_bytes : int      records and bytes that this run has made
+    reason : str               why this shard could not be made; empty when it was
+    """
+
+    n_done: int
+    n_records: int
+    n_failed: int
+    n_made: int
+    n_bytes: int
+    reason: str
+
+
+class RunProgress:
+    """Progress over records: a bar on a terminal and in notebooks, elsewhere a line at times.
+
+    Parameters
+    ----------
+    quiet : True shows nothing
+    n_records : records of the run
+    counts : records of shards at work; without it records count when their shard is whole
+    """
+
+    def __init__(
+        self, *, quiet: bool, n_records: int, counts: Counts | None = None
+    ) -> None:
+        self.quiet = quiet
+        self.n_records = n_records
+        self.counts = counts
+        self._last: Progress | None = None
+        self._begin = time.monotonic()
+        # time and number of records when the first of this run were seen: compiling is over
+        self._first: tuple[float, int] | None = None
+        self._bar: Any = None
+        self._ended = threading.Event()
+        self._ticker = threading.Thread(target=self._tick, daemon=True)
+
+    def __enter__(self) -> RunProgress:
+        if self.quiet:
+            return self
+        if _is_interactive():
+            self._start_bar()
+        self._ticker.start()
+        return self
+
+    def __exit__(self, *_details: object) -> None:
+        self._ended.set()
+        if self._ticker.is_alive():
+            self._ticker.join()
+        if self._bar is not None:
+            self._bar.stop()
+
+    def __call__(self, progress: Progress) -> None:
+        """Take the state at the beginning, and after a shard that is finished or given up."""
+        self._last = progress
+        if self._bar is not None or self._is_done:
+            self._show()
+
+    @property
+    def _is_done(self) -> bool:
+        last = self._last
+        return last is not None and last.n_made > 0 and last.n_done == self.n_records
+
+    @property
+    def _n_at_work(self) -> int:
+        if self.counts is None:
+            return 0
+        return self.counts.n_made
+
+    @property
+    def _n_done(self) -> int:
+        whole = self._last.n_done if self._last is not None else 0
+        return min(self.n_records, whole + self._n_at_work)
+
+    @property
+    def _n_made(self) -> int:
+        """Records of this run."""
+        whole = self._last.n_made if self._last is not None else 0
+        return whole + self._n_at_work
+
+    def _start_bar(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+        self._bar = Progress(
+            TextColumn("records"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[facts]}"),
+            console=Console(stderr=True),
+        )
+        self._bar.start()
+        self._task = self._bar.add_task(
+            "records", total=self.n_records, facts=self.facts()
+        )
+
+    def _tick(self) -> None:
+        """Show the time pass, also while no record is finished."""
+        while not self._ended.wait(self._pause()):
+            if self._bar is not None or not self._is_done:
+                self._show()
+
+    def _pause(self) -> float:
+        """Seconds to the next line; lines come less often in a long run."""
+        if self._bar is not None:
+            return 0.5
+        return max(LINE_SECONDS, 0.01 * (time.monotonic() - self._begin))
+
+    def _show(self) -> None:
+        if self.quiet:
+            return
+        if self._bar is not None:
+            self._bar.update(self._task, completed=self._n_done, facts=self.facts())
+            return
+        line = f"{self._n_done} of {self.n_records} records, {self.facts()}"
+        if self._is_done:
+            line += "; checksums, figures and card follow"
+        print(line, file=sys.stderr, flush=True)
+
+    def facts(self) -> str:
+        """Rate, bytes and time left, as far as they are known."""
+        now, n_made = time.monotonic(), self._n_made
+        if not n_made:
+            text = f"{now - self._begin:.0f} s"
+            if self.counts is not None and self.counts.is_compiling:
+                text += f"; {COMPILING}"
+            return text
+        if self._first is None:
+            self._first = now, n_made
+        rate = self._rate(now, n_made)
+        left = _duration((self.n_records - self._n_done) / rate)
+        text = f"{rate:.1f} records/s"
+        if self._last is not None and self._last.n_bytes:
+            text += f", {self._last.n_bytes / 1e6:.1f} MB"
+        text += f", {left} left"
+        if self._last is not None and self._last.n_failed:
+            text += f", {self._last.n_failed} failed"
+        return text
+
+    def _rate(self, now: float, n_made: int) -> float:
+        """Records a second since the first ones came, or since the beginning."""
+        begin, n_before = self._begin, 0
+        if self._first is not None and n_made > self._first[1]:
+            begin, n_before = self._first
+        return (n_made - n_before) / max(now - begin, 1e-3)
+
+
+def _is_interactive() -> bool:
+    """True on a terminal and in a notebook, where a bar can move."""
+    if sys.stderr.isatty():
+        return True
+    if "IPython" not in sys.modules:
+        return False
+    from rich.console import Console
+
+    return Console().is_jupyter
+
+
+def _duration(seconds: float) -> str:
+    """A time for reading, such as '42 s', '3 min 10 s', '2 h 5 min'."""
+    minutes, seconds = divmod(round(seconds), 60)
+    if not minutes:
+        return f"{seconds} s"
+    if minutes < 60:
+        return f"{minutes} min {seconds} s"
+    return f"{minutes // 60} h {minutes % 60} min"
