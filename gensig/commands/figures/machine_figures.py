@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -159,44 +160,72 @@ def plot_record(
     path: Path,
     *,
     name: str | None = None,
+    sound: NDArray[np.float32] | None = None,
 ) -> None:
     """Draw signal, spectrum and envelope spectrum of one channel of a record.
 
-    ``name`` is that of the record in the title; None takes its class and severity.
+    ``name`` is that of the record in the title; None takes its class and severity. ``sound``
+    (channel, sample) is the same record of the healthy machine, drawn in front of the faulty one.
     """
     names = system.sensing.channel_names
     channel = shown_channel(names)
-    signal = acceleration[names.index(channel)].astype(np.float64)
     rate = system.sensing.sampling_rate
     unit = channel_unit(channel).replace("^2", "$^2$")
     shaft = values["speed_rpm"] / 60.0
+    shown_name = record_name(values, name)
+    row = names.index(channel)
+    lines = [_Line(signal=acceleration[row].astype(np.float64))]
+    if sound is not None:
+        lines = [
+            replace(lines[0], color=FAULTY, label=str(values["label_name"])),
+            _Line(signal=sound[row].astype(np.float64), label="without the fault"),
+        ]
     figure, axes = panels(3, 1, 11, 8.5)
     wave, spectrum, envelope = axes[:, 0]
-    shown = min(len(signal), int(5.0 * rate / shaft))
-    curve(wave, np.arange(shown) / rate, signal[:shown], SOUND, width=0.5)
+    _wave(wave, lines, rate, shaft)
     what = "acceleration"
     if channel.endswith(SPEED):
         what = "speed less the nominal one"
     title = f"{channel}, first turns of the pinion"
     titles(wave, title, "time, s", f"{what}, {unit}")
-    _spectrum(spectrum, signal, rate, values["mesh_frequency_hz"])
-    _envelope(envelope, signal, rate, shaft)
+    _spectrum(spectrum, lines, rate, values["mesh_frequency_hz"])
+    _envelope(envelope, lines, rate, shaft)
     for panel in (spectrum, envelope):
         panel.set_ylabel(f"amplitude, {unit}")
+    if sound is not None:
+        wave.legend(loc="upper right")
     point = f"{values['speed_rpm']:.1f} r/min, {values['torque_nm']:.3g} N m"
-    figure.suptitle(f"{record_name(values, name)}: {point}")
+    figure.suptitle(f"{shown_name}: {point}")
     save(figure, path)
 
 
-def _spectrum(axes: Any, signal: NDArray[np.float64], rate: float, mesh: float) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Line:
+    """One record in a figure; ``signal`` (sample,)."""
+
+    signal: NDArray[np.float64]
+    color: str = SOUND
+    label: str = ""
+
+
+def _wave(axes: Any, lines: Sequence[_Line], rate: float, shaft: float) -> None:
+    for line in lines:
+        shown = min(len(line.signal), int(5.0 * rate / shaft))
+        time = np.arange(shown) / rate
+        curve(axes, time, line.signal[:shown], line.color, line.label, width=0.5)
+
+
+def _spectrum(axes: Any, lines: Sequence[_Line], rate: float, mesh: float) -> None:
     from gensig.signals.spectrum import amplitude_spectrum
 
-    frequency, amplitude = amplitude_spectrum(signal, rate)
-    highest, top = USABLE_SHARE * rate, amplitude.max()
-    shown = np.maximum(amplitude, 1e-9)
-    axes.semilogy(frequency / 1e3, shown, color=SOUND, linewidth=0.5)
+    highest, top = USABLE_SHARE * rate, 0.0
+    for line in lines:
+        frequency, amplitude = amplitude_spectrum(line.signal, rate)
+        top = max(top, float(amplitude.max()))
+        shown = np.maximum(amplitude, 1e-9)
+        axes.semilogy(frequency / 1e3, shown, color=line.color, linewidth=0.5)
     for harmonic in range(1, int(highest / mesh) + 1):
-        axes.axvline(harmonic * mesh / 1e3, color=FAULTY, linewidth=0.4, alpha=0.5)
+        axes.axvline(harmonic * mesh / 1e3, color=GREY, linewidth=0.4, alpha=0.5)
     axes.set(
         title=f"Spectrum; lines at harmonics of the mesh frequency {mesh:.1f} Hz",
         xlabel="frequency, kHz",
@@ -205,17 +234,16 @@ def _spectrum(axes: Any, signal: NDArray[np.float64], rate: float, mesh: float) 
     )
 
 
-def _envelope(
-    axes: Any, signal: NDArray[np.float64], rate: float, shaft: float
-) -> None:
+def _envelope(axes: Any, lines: Sequence[_Line], rate: float, shaft: float) -> None:
     from gensig.signals.envelope import envelope_spectrum
 
     low, high = (share * rate for share in ENVELOPE_BAND)
-    frequency, amplitude = envelope_spectrum(signal, rate, (low, high))
-    shown = (frequency > 0.0) & (frequency < 12.0 * shaft)
-    curve(axes, frequency[shown], amplitude[shown], SOUND, width=0.8)
+    for line in lines:
+        frequency, amplitude = envelope_spectrum(line.signal, rate, (low, high))
+        shown = (frequency > 0.0) & (frequency < 12.0 * shaft)
+        curve(axes, frequency[shown], amplitude[shown], line.color, width=0.8)
     for turn in range(1, 12):
-        axes.axvline(turn * shaft, color=FAULTY, linewidth=0.5, alpha=0.5)
+        axes.axvline(turn * shaft, color=GREY, linewidth=0.5, alpha=0.5)
     kilohertz = f"{low / 1e3:.3g} to {high / 1e3:.3g} kHz"
     title = f"Envelope spectrum of {kilohertz}; lines at turns of the pinion"
     axes.set(title=title, xlabel=FREQUENCY)

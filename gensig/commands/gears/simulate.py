@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +21,7 @@ from gensig.commands.gears.run_up import (
     write_levels,
 )
 from gensig.commands.output import FIGURE_TYPES, check_file, check_new
-from gensig.errors import ConfigError
+from gensig.errors import ConfigError, SimulationError
 from gensig.faults.registry import without_vary
 from gensig.life.life_options import NO_LIFE
 from gensig.options.configuration import Configuration
@@ -56,13 +58,22 @@ def simulate(arguments: Namespace) -> int:
             "--record and --twin are of a data set; give it with --from DIR"
         )
     config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
-    return _show(config, configured_record(config), arguments)
+    config, row = configured_row(config)
+    return _show(config, row, simulate_record(config, row), arguments)
 
 
 def configured_record(config: Configuration) -> Record:
     """The record of a configuration, every value as configured rather than drawn.
 
     It has the traces of `with_traces`.
+    """
+    return simulate_record(*configured_row(config))
+
+
+def configured_row(config: Configuration) -> tuple[Configuration, Mapping[str, Any]]:
+    """The configuration of one record with traces, and its row of the plan.
+
+    Every value is as configured rather than drawn.
     """
     name = config["fault"]["kind"]
     config = config.with_keys(
@@ -84,7 +95,7 @@ def configured_record(config: Configuration) -> Record:
     )
     plan = make_plan(config)
     note(*plan_doubts(config, plan))
-    return simulate_record(with_traces(config), plan.record(0))
+    return with_traces(config), plan.record(0)
 
 
 def _simulate_recorded(arguments: Namespace) -> int:
@@ -97,16 +108,21 @@ def _simulate_recorded(arguments: Namespace) -> int:
     if arguments.record is None:
         raise ConfigError("--from needs --record I, the number or id of a record")
     config, row = recorded_row(Path(arguments.folder), arguments.record)
+    config = with_traces(config)
     if not arguments.twin:
-        return _show(config, simulate_record(with_traces(config), row), arguments)
+        return _show(config, row, simulate_record(config, row), arguments)
     name = f"healthy twin of {row['record_id']} ({row['label_name']})"
-    return _show(config, simulate_twin(with_traces(config), row), arguments, name)
+    return _show(config, row, simulate_twin(config, row), arguments, name)
 
 
 def _show(
-    config: Configuration, record: Record, arguments: Namespace, name: str | None = None
+    config: Configuration,
+    row: Mapping[str, Any],
+    record: Record,
+    arguments: Namespace,
+    name: str | None = None,
 ) -> int:
-    """Write, draw and print one record of `with_traces`.
+    """Write, draw and print one record of `with_traces`, and its row.
 
     A record without a name has its class and severity.
     """
@@ -125,7 +141,8 @@ def _show(
     if arguments.plot:
         with replaced_file(arguments.plot) as path:
             if run_up is None:
-                plot_record(system, acceleration, values, path, name=name)
+                sound = _without_fault(config, row, record)
+                plot_record(system, acceleration, values, path, name=name, sound=sound)
             else:
                 plot_run_up(run_up, path, name=record_name(values, name))
     if arguments.orders and run_up is not None:
@@ -138,6 +155,21 @@ def _show(
     if run_up is not None:
         print_run_up(run_up)
     return 0
+
+
+def _without_fault(
+    config: Configuration, row: Mapping[str, Any], record: Record
+) -> np.ndarray | None:
+    """Acceleration of the same record of the healthy machine, (channel, sample).
+
+    None where the record has no fault, and where the healthy machine makes no record.
+    """
+    if record.values["faults_json"] == "[]":
+        return None
+    try:
+        return simulate_twin(config, row).signals["acceleration"]
+    except SimulationError:
+        return None
 
 
 def _run_up(system: Machine, record: Record, arguments: Namespace) -> RunUp | None:
