@@ -34,7 +34,7 @@ Batch = tuple[Any, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Draw:
+class _Draw:
     """One window that is drawn: its record and its first sample."""
 
     record: StreamedRecord
@@ -162,7 +162,7 @@ class ReplayStream(torch.utils.data.IterableDataset[Batch]):
 
     def _draws(
         self, ahead: RecordsAhead[StreamedRecord], rng: np.random.Generator
-    ) -> Iterator[Draw]:
+    ) -> Iterator[_Draw]:
         """Draws from a buffer, in which a record that is used up gives way to the next."""
         buffer: list[_HeldRecord] = []
         while len(buffer) < self.buffer_records and (record := ahead.take()):
@@ -171,7 +171,7 @@ class ReplayStream(torch.utils.data.IterableDataset[Batch]):
         while buffer:
             place = int(rng.integers(len(buffer)))
             held = buffer[place]
-            yield Draw(record=held.record, start=held.next_start())
+            yield _Draw(record=held.record, start=held.next_start())
             if self.reuse is None:
                 if ahead.is_ready() and (record := ahead.take()):
                     buffer[n_replaced % len(buffer)] = self._held(record)
@@ -186,7 +186,7 @@ class ReplayStream(torch.utils.data.IterableDataset[Batch]):
     def _held(self, record: StreamedRecord) -> _HeldRecord:
         return _HeldRecord(record, reuse=self.reuse or 1, crop=self.crop)
 
-    def _item(self, chosen: Sequence[Draw], generator: torch.Generator) -> Batch:
+    def _item(self, chosen: Sequence[_Draw], generator: torch.Generator) -> Batch:
         """Batch of some draws, or the one window."""
         options = self._windows.options
         length = options.window_samples
@@ -202,7 +202,7 @@ class ReplayStream(torch.utils.data.IterableDataset[Batch]):
         facts = torch.utils.data.default_collate([self._facts(draw) for draw in chosen])
         return windows, *facts
 
-    def _facts(self, draw: Draw) -> tuple[Any, ...]:
+    def _facts(self, draw: _Draw) -> tuple[Any, ...]:
         """Target of a draw, and its metadata where they are wanted."""
         if not self.return_metadata:
             return (draw.record.target,)

@@ -20,8 +20,8 @@ Range = tuple[float, float]
 
 # Exponent of frequency by which the power density of a noise falls.
 COLORS = {"white": 0.0, "pink": 1.0, "brown": 2.0}
-# Points a sample between which `Resample` interpolates linearly.
-POINTS_PER_SAMPLE = 8
+# Points a sample between which `Resample` interpolates by cubic polynomials.
+POINTS_PER_SAMPLE = 4
 
 
 class Transform(ABC):
@@ -197,8 +197,8 @@ class Resample(Transform):
     -----
     Sample ``i`` of the result is the band-limited window at ``factor * i``. Where that lies
     beyond its end, the window begins again. Content that would pass half the sampling rate is
-    removed. The error at a tone is below 1.3 % of its amplitude up to 0.4 of the sampling rate
-    before the change, and 0.1 % up to 0.1.
+    removed. The error at a tone is below 0.4 % of its amplitude up to 0.4 of the sampling rate
+    before the change, and 0.03 % up to 0.2.
     """
 
     factor: Range
@@ -214,17 +214,18 @@ class Resample(Transform):
         factor = _uniform(self.factor, (len(windows), 1, 1), windows, generator)
         spectrum = torch.fft.rfft(windows)
         bins = torch.arange(spectrum.shape[-1], device=windows.device)
-        spectrum = spectrum * (bins * factor.clamp(min=1.0) < n_samples / 2)
+        stays = bins * factor.clamp(min=1.0) < n_samples / 2
         n_points = POINTS_PER_SAMPLE * n_samples
-        points = torch.fft.irfft(spectrum, n=n_points) * POINTS_PER_SAMPLE
+        points = torch.fft.irfft(spectrum * (stays * POINTS_PER_SAMPLE), n=n_points)
         sample = torch.arange(n_samples, device=windows.device, dtype=torch.float64)
         place = sample * factor * POINTS_PER_SAMPLE
         before = place.floor()
-        weight = (place - before).to(windows.dtype)
-        index = before.long() % n_points
-        return torch.lerp(
-            _at(points, index), _at(points, (index + 1) % n_points), weight
-        )
+        weights = _cubic_weights((place - before).to(windows.dtype))
+        index = before.long() - 1
+        result = torch.zeros_like(windows)
+        for number, weight in enumerate(weights):
+            result.addcmul_(weight, _at(points, (index + number) % n_points))
+        return result
 
 
 @dataclass(frozen=True, slots=True)
@@ -343,6 +344,17 @@ def _colored(noise: torch.Tensor, exponent: float) -> torch.Tensor:
         share[-1] = 1.0
     density = density * n_samples / (share * density).sum()
     return torch.fft.irfft(torch.fft.rfft(noise) * density.sqrt(), n=n_samples)
+
+
+def _cubic_weights(place: torch.Tensor) -> tuple[torch.Tensor, ...]:
+    """Weights of the points at -1, 0, 1 and 2 for a place from 0 to 1: Lagrange's polynomials."""
+    left, right, far = place + 1, place - 1, place - 2
+    return (
+        -place * right * far / 6,
+        left * right * far / 2,
+        -left * place * far / 2,
+        left * place * right / 6,
+    )
 
 
 def _at(signals: torch.Tensor, index: torch.Tensor) -> torch.Tensor:

@@ -76,6 +76,13 @@ def test_the_windows_that_are_given_stay_as_they_are(transform):
     assert torch.equal(batch, before)
 
 
+@pytest.mark.parametrize("transform", ALL, ids=str)
+def test_windows_of_another_device_stay_there(transform):
+    """Draws of the generator's device are carried over; a mixture of devices is an error."""
+    batch = torch.zeros((4, 3, 256), device="meta")
+    assert transform(batch, seeded()).device.type == "meta"
+
+
 @pytest.mark.parametrize("color", ["white", "pink", "brown"])
 @pytest.mark.parametrize("snr_db", [-10.0, 0.0, 25.0])
 def test_noise_has_the_ratio_that_is_asked_for_in_every_channel(color, snr_db):
@@ -143,13 +150,13 @@ def test_a_shift_is_a_roll_of_all_channels_within_its_range():
     assert set(shifts) == set(range(-5, 6))
 
 
-@pytest.mark.parametrize("factor", [0.8, 0.97, 1.0, 1.06, 1.3])
-@pytest.mark.parametrize(("frequency", "error"), [(0.1, 1e-3), (0.3, 8e-3)])
+@pytest.mark.parametrize("factor", [0.8, 0.97, 1.0, 1.06, 1.2])
+@pytest.mark.parametrize(("frequency", "error"), [(0.2, 3e-4), (0.4, 4e-3)])
 def test_resampling_moves_a_tone_by_the_factor(factor, frequency, error):
     """A tone of whole periods, so that the window begins again without a step."""
     frequency = round(frequency * N_SAMPLES) / N_SAMPLES
     result = Resample((factor, factor))(tone(frequency))
-    assert_close(result, tone(frequency * factor), atol=1.5 * error, rtol=0)
+    assert_close(result, tone(frequency * factor), atol=error, rtol=0)
 
 
 def test_resampling_removes_what_would_pass_half_the_rate():
