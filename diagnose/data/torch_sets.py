@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,23 +9,27 @@ import numpy as np
 import torch
 import torch.utils.data
 
+from diagnose.data.loading.items import metadata_of, record_values, target_of
+from diagnose.data.loading.streamed import (
+    StreamedWindows,
+    WindowOptions,
+    known_segments,
+    worker_share,
+)
+from diagnose.data.loading.transforms import AnyTransform, transformed
 from diagnose.data.windows import (
-    IntArray,
-    Segments,
-    Task,
     normalised,
     plan_windows,
     read_signal,
-    subset_segments,
     task_of,
 )
-from gensig.errors import ConfigError, DatasetError
+from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
-
-Item = tuple[torch.Tensor, int]
+# Window and target; with ``return_metadata`` the metadata are third.
+Item = tuple[Any, ...]
 
 
 class VibrationDataset(torch.utils.data.Dataset[Item]):
@@ -43,15 +46,26 @@ class VibrationDataset(torch.utils.data.Dataset[Item]):
     window_samples, stride_samples : length of a window and step from one to the next
     channels, classes : names to keep, in this order; all where None
     normalise : ``"rms"`` divides each channel of a window by its RMS, ``"none"`` keeps m/s^2
+    transform : function of a window (channel, sample), called after `normalise`
+    target : value to learn: ``"class"``, index into ``class_names``; ``"severity"``, float32 from
+        0 (sound) to 1; ``"gear"``, index into ``target_names``, of which the first is none;
+        ``"life"``, float32 hours until failure. Lives that did not fail are left out there,
+        because their hours are a lower bound
+    return_metadata : add a third item, a dict of numbers and texts: the columns
+        `diagnose.data.loading.items.METADATA` of the record, ``start_sample`` and
+        ``sampling_rate_hz``
 
     Raises
     ------
-    ConfigError    for a name that does not exist or a subset that would be empty
+    ConfigError    for a name that does not exist, a target that the data set lacks, or a subset
+        that would be empty
 
     Notes
     -----
-    An item is ``(window, label)``: (channel, sample) float32 and an index into ``class_names``.
+    An item is ``(window, target)``: (channel, sample) float32 and an int or a float32 tensor ().
     ``record`` (window,) is the record of every window, for averages of predictions over records.
+    ``label`` (window,) is its class. ``target_names`` are the names that a target is an index of,
+    empty for a number.
     """
 
     def __init__(
@@ -65,6 +79,9 @@ class VibrationDataset(torch.utils.data.Dataset[Item]):
         channels: Sequence[str] | None = None,
         classes: Sequence[str] | None = None,
         normalise: str = "rms",
+        transform: AnyTransform | None = None,
+        target: str = "class",
+        return_metadata: bool = False,
     ) -> None:
         self._task = task_of(
             dataset,
@@ -73,22 +90,30 @@ class VibrationDataset(torch.utils.data.Dataset[Item]):
             normalise=normalise,
             classes=classes,
             channels=channels,
+            one_class=target != "class",
         )
-        segments = subset_segments(self._task, protocol, subset)
+        self._target = target_of(self._task, target)
+        segments = known_segments(self._task, self._target, protocol, subset)
         segment, self.start = plan_windows(segments, window_samples, stride_samples)
         self.record = segments.record[segment]
         self.label = self._task.labels()[self.record]
         self.class_names = self._task.class_names
+        self.target_names = self._target.names
+        self.transform, self.return_metadata = transform, return_metadata
 
     def __len__(self) -> int:
         return int(self.record.size)
 
     def __getitem__(self, index: int) -> Item:
-        task, start = self._task, int(self.start[index])
-        stop = start + task.window_samples
-        signal = read_signal(task, int(self.record[index]), start, stop)
+        task, record = self._task, int(self.record[index])
+        start = int(self.start[index])
+        signal = read_signal(task, record, start, start + task.window_samples)
         window = torch.from_numpy(normalised(signal, task.normalise))
-        return window, int(self.label[index])
+        item = transformed(window, self.transform), self._target.of(record)
+        if not self.return_metadata:
+            return item
+        rate = float(task.dataset.sampling_rate)
+        return *item, metadata_of(record_values(task, record), start, rate)
 
 
 class StreamingDataset(torch.utils.data.IterableDataset[Item]):
@@ -104,13 +129,15 @@ class StreamingDataset(torch.utils.data.IterableDataset[Item]):
     stream : as made by ``gensig.stream``, or a part of it
     protocol, subset : as for `VibrationDataset`; all records if both are None
     window_samples, stride_samples, channels, classes, normalise : as for `VibrationDataset`
+    transform, target, return_metadata : as for `VibrationDataset`
     n_epochs : epochs in one pass, each with other random draws, of units too; None never ends
     shuffle_buffer : windows that every worker holds back and draws from at random; 0 keeps the
         plan's order
 
     Raises
     ------
-    ConfigError    for a name that does not exist or a subset that would be empty
+    ConfigError    for a name that does not exist, a target that the stream lacks, or a subset
+        that would be empty
 
     Notes
     -----
@@ -131,123 +158,64 @@ class StreamingDataset(torch.utils.data.IterableDataset[Item]):
         channels: Sequence[str] | None = None,
         classes: Sequence[str] | None = None,
         normalise: str = "rms",
+        transform: AnyTransform | None = None,
+        target: str = "class",
+        return_metadata: bool = False,
         n_epochs: int | None = 1,
         shuffle_buffer: int = 0,
     ) -> None:
-        if (protocol is None) != (subset is None):
-            raise ConfigError("give protocol and subset, or neither of them")
-        if (n_epochs is not None and n_epochs < 1) or shuffle_buffer < 0:
-            raise ConfigError(
-                "n_epochs must be at least 1 or None, shuffle_buffer at least 0"
-            )
-        self._stream, self._part = stream, (protocol, subset)
-        self._options: dict[str, Any] = {
-            "window_samples": window_samples,
-            "stride_samples": stride_samples,
-            "normalise": normalise,
-            "classes": classes,
-            "channels": channels,
-        }
+        if shuffle_buffer < 0:
+            raise ConfigError(f"shuffle_buffer = {shuffle_buffer} must be at least 0")
+        options = WindowOptions(
+            protocol=protocol,
+            subset=subset,
+            window_samples=window_samples,
+            stride_samples=stride_samples,
+            channels=channels,
+            classes=classes,
+            normalise=normalise,
+            target=target,
+            n_epochs=n_epochs,
+        )
+        self._windows = StreamedWindows(stream, options)
+        self.class_names = self._windows.class_names
+        self.target_names = self._windows.target_names
+        self.n_windows = self._windows.n_windows
+        self.transform, self.return_metadata = transform, return_metadata
         self.n_epochs, self.shuffle_buffer = n_epochs, shuffle_buffer
-        task, windows = self._plan(stream)
-        self.class_names = task.class_names
-        self.n_windows = sum(len(starts) for starts in windows.values())
-        # shared memory, so that workers that stay alive between passes see a new epoch
-        self._epoch = torch.tensor(stream.epoch).share_memory_()
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._epoch.share_memory_()
 
     @property
     def epoch(self) -> int:
         """The epoch at which the next pass begins."""
-        return int(self._epoch)
+        return self._windows.epoch
 
     def set_epoch(self, epoch: int) -> None:
         """Begin the next pass at another epoch, in every worker."""
-        if epoch < 0:
-            raise ConfigError(f"epoch = {epoch} must be at least 0")
-        self._epoch.fill_(epoch)
+        self._windows.set_epoch(epoch)
 
     def __iter__(self) -> Iterator[Item]:
-        worker = torch.utils.data.get_worker_info()
-        index, n_workers = 0, 1
-        if worker is not None:
-            index, n_workers = worker.id, worker.num_workers
+        index, n_workers = worker_share()
         epoch = self.epoch
         items = self._items(epoch, index, n_workers)
         if self.shuffle_buffer:
-            rng = np.random.default_rng([self._stream.seed, epoch, index])
+            rng = np.random.default_rng([self._windows.stream.seed, epoch, index])
             items = _shuffled(items, self.shuffle_buffer, rng)
         return items
 
     def _items(self, first_epoch: int, worker: int, n_workers: int) -> Iterator[Item]:
         """The items of one worker in the plan's order."""
-        for epoch in itertools.count(first_epoch):
-            if self.n_epochs is not None and epoch == first_epoch + self.n_epochs:
-                return
-            stream = self._stream.at_epoch(epoch)
-            task, windows = self._plan(stream)
-            part = stream.take(sorted(windows)).shard(worker, n_workers)
-            if self.n_epochs is None and not len(part):
-                return  # fewer conditions than workers: no record will ever come
-            record_ids = stream.column("record_id").tolist()
-            index_of = {name: index for index, name in enumerate(record_ids)}
-            labels = task.labels()
-            for record in part:
-                if record.values["status"] == "ok":
-                    index = index_of[record.values["record_id"]]
-                    for window in _cut(task, record, windows[index]):
-                        yield window, int(labels[index])
-
-    def _plan(self, stream: Any) -> tuple[Task, dict[int, IntArray]]:
-        """Task of one epoch; record -> first samples of its windows, without empty ones."""
-        task = task_of(stream, **self._options)
-        protocol, subset = self._part
-        if protocol is None or subset is None:
-            segments = _whole_records(task)
-        else:
-            segments = subset_segments(task, protocol, subset)
-        segment, start = plan_windows(
-            segments, task.window_samples, task.stride_samples
-        )
-        record = segments.record[segment]
-        order = np.argsort(record, kind="stable")
-        records, first = np.unique(record[order], return_index=True)
-        starts = np.split(start[order], first[1:])
-        return task, dict(zip(records.tolist(), starts, strict=True))
-
-
-def _whole_records(task: Task) -> Segments:
-    """Every record of the task's classes."""
-    record = np.flatnonzero(task.labels() >= 0)
-    if record.size == 0:
-        raise ConfigError(
-            f"the stream has no record of {', '.join(task.class_names)}; "
-            "give a larger part of it"
-        )
-    return Segments(
-        record=record,
-        start=np.zeros_like(record),
-        stop=np.full_like(record, task.dataset.n_samples),
-    )
-
-
-def _cut(task: Task, record: Any, starts: IntArray) -> Iterator[torch.Tensor]:
-    """Windows (channel, sample) of one record, normalised as those of a stored one.
-
-    Refuses what is not finite.
-    """
-    signal = record.signals["acceleration"][task.channels]
-    if not np.isfinite(signal).all():
-        raise DatasetError(
-            f"record {record.values['record_id']}: "
-            "its signal holds values that are not finite"
-        )
-    for start in starts:
-        window = np.ascontiguousarray(signal[:, start : start + task.window_samples])
-        yield torch.from_numpy(normalised(window, task.normalise))
+        length = self._windows.options.window_samples
+        rate = self._windows.sampling_rate
+        for record in self._windows.records(first_epoch, worker, n_workers):
+            for start in record.windows.start.tolist():
+                cut = np.ascontiguousarray(record.signal[:, start : start + length])
+                normal = normalised(cut, self._windows.options.normalise)
+                window = transformed(torch.from_numpy(normal), self.transform)
+                if self.return_metadata:
+                    metadata = metadata_of(record.values, start, rate)
+                    yield window, record.target, metadata
+                else:
+                    yield window, record.target
 
 
 def _shuffled(

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 MAX_OPEN_SHARDS = 64
+PAIR_GEARS = ("pinion", "wheel")  # gears of a set that names none
 
 SplitRows = dict[str, list[tuple[int, float, float]]]
 
@@ -150,6 +151,11 @@ class Dataset:
         if IS_REFERENCE not in self._types:
             return np.zeros(self.n_records, dtype=bool)
         return self.column(IS_REFERENCE) == 1
+
+    @property
+    def gear_names(self) -> list[str]:
+        """Names of the gears: pinion and wheel, in sets of drive lines all of the line."""
+        return list(self.attributes.get(GEAR_NAMES, PAIR_GEARS))
 
     def n_teeth(self, gear: str) -> np.ndarray:
         """Teeth of a gear, (record,) int64: of each unit's gear, or of the one design.

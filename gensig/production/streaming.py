@@ -107,6 +107,11 @@ class RecordStream:
             )
         return self.plan.columns[name][self.numbers]
 
+    @property
+    def gear_names(self) -> list[str]:
+        """Names of the gears: pinion and wheel, of a drive line all of the line."""
+        return list(read_machine(self.config).gears)
+
     def n_teeth(self, gear: str) -> NDArray[np.int64]:
         """Teeth of a gear, (record,): of each unit's gear, or of the one design."""
         name = f"n_teeth_{gear}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -82,7 +83,7 @@ def finished_records(config: Configuration, rows: Sequence[Row]) -> Iterator[Rec
             inputs=inputs[index],
             motion=of_records[index],
             sound=of_sound.get(index, of_records[index]),
-            twin_power=_TWINS.get(keys[index]),
+            twin_power=_TWINS.power.get(keys[index]),
         )
         yield _record(config, row, measured)
 
@@ -303,13 +304,21 @@ def _multihot(config: Configuration, row: Row) -> NDArray[np.int8]:
 
 
 TwinKey = tuple[str, str]  # identity of the data set, condition
-# Power of healthy twins at the sensors, kept from one call to the next.
-_TWINS: dict[TwinKey, Array | SimulationError] = {}
+
+
+class _Twins(threading.local):
+    """Power of healthy twins at the sensors, kept from one call to the next by each thread."""
+
+    def __init__(self) -> None:
+        self.power: dict[TwinKey, Array | SimulationError] = {}
+
+
+_TWINS = _Twins()
 
 
 def forget_twins() -> None:
     """Drop what is kept of healthy twins, so that a timing counts them."""
-    _TWINS.clear()
+    _TWINS.power.clear()
 
 
 def _twin_keys(config: Configuration, rows: Sequence[Row]) -> list[TwinKey]:
@@ -328,7 +337,7 @@ def _missing_twins(
     twins: dict[TwinKey, RecordInputs] = {}
     shared: dict[TwinKey, RecordInputs] = {}
     for each, key in zip(inputs, keys, strict=True):
-        if not each.machine.sensing.noise_follows_twin or key in _TWINS:
+        if not each.machine.sensing.noise_follows_twin or key in _TWINS.power:
             continue
         twin = each.healthy_twin()
         twins.setdefault(key, twin)
@@ -342,9 +351,9 @@ def _keep_twins(
     simulated: dict[TwinKey, tuple[RecordInputs, CleanRecord | SimulationError]],
 ) -> None:
     """Keep the twins of these records: those known before, and those simulated now."""
-    known = {key: _TWINS[key] for key in keys if key in _TWINS}
-    _TWINS.clear()
-    _TWINS.update(known)
+    known = {key: _TWINS.power[key] for key in keys if key in _TWINS.power}
+    _TWINS.power.clear()
+    _TWINS.power.update(known)
     for key, (inputs, motion) in simulated.items():
         power: Array | SimulationError
         if isinstance(motion, SimulationError):
@@ -352,4 +361,4 @@ def _keep_twins(
         else:
             measured = inputs.instrument.measure(motion.acceleration)
             power = inputs.instrument.power(measured)
-        _TWINS[key] = power
+        _TWINS.power[key] = power

@@ -1,6 +1,8 @@
 """A stream makes the bits that generate stores: whole, by number, in parts, epoch by epoch."""
 
 import itertools
+import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -8,11 +10,14 @@ from numpy.testing import assert_array_equal
 from torch.utils.data import DataLoader
 
 import gensig
-from diagnose.data.torch_sets import StreamingDataset, VibrationDataset
+from diagnose.data import ReplayStream, StreamingDataset, VibrationDataset
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.schema import SIGNALS
 from gensig.errors import ConfigError, DatasetError
+from gensig.production.folder import root_attributes
 from gensig.production.streaming import _as_stored, epoch_seed, open_stream
+from gensig.record import simulate
+from gensig.record.machines import read_machine
 from gensig.record.simulate import Record
 
 SMALL = (
@@ -165,6 +170,64 @@ def test_windows_are_those_of_the_stored_set_also_from_workers_and_a_fresh_proce
             multiprocessing_context=start,
         )
         assert bits(loader) == order
+
+
+def test_two_threads_make_the_records_of_one(stream, monkeypatch):
+    """Both are in the midst of their records at the same time."""
+    streams = [stream.take([0, 1, 2]), stream.at_epoch(1).take([0, 1, 2])]
+    expected = [samples(each) for each in streams]
+    barrier, plain = threading.Barrier(2), simulate._record
+
+    def together(*arguments):
+        barrier.wait(30)
+        return plain(*arguments)
+
+    monkeypatch.setattr(simulate, "_record", together)
+    with ThreadPoolExecutor(2) as threads:
+        assert list(threads.map(samples, streams)) == expected
+
+
+def test_items_with_metadata_are_those_of_the_stored_set(stream, stored):
+    options = {
+        "window_samples": 300,
+        "stride_samples": 300,
+        "target": "gear",
+        "return_metadata": True,
+    }
+    subset = ("random_window_leaky", "train")
+    streamed = list(StreamingDataset(stream, *subset, **options))
+    expected = VibrationDataset(stored, *subset, **options)
+    assert expected.target_names == ("none", "pinion", "wheel")
+    assert len(streamed) == len(expected)
+    assert {target for _, target, _ in streamed} > {0}
+    for index, (window, target, metadata) in enumerate(streamed):
+        assert bits([(window, target)]) == bits([expected[index][:2]])
+        assert metadata == expected[index][2]
+    assert {"speed_rpm", "unit_id", "torque_nm", "severity"} <= set(streamed[0][2])
+
+
+def test_replayed_windows_are_parts_of_the_stored_records(stream, stored):
+    options = {"window_samples": 300, "stride_samples": 300, "normalise": "none"}
+    windows = ReplayStream(
+        stream, **options, reuse=2, buffer_records=3, return_metadata=True
+    )
+    items = list(DataLoader(windows, batch_size=None, num_workers=2))
+    assert len(items) == windows.n_windows == 2 * 6 * (stored.n_samples // 300)
+    for window, label, metadata in items:
+        record = stored.column("record_id").tolist().index(metadata["record_id"])
+        start = metadata["start_sample"]
+        signal = stored.signals(record, start, start + 300)
+        signal = signal - signal.mean(axis=-1, keepdims=True)
+        assert window.numpy().tobytes() == signal.tobytes()
+        assert label == stored.column("label")[record]
+
+
+def test_a_stream_names_the_gears_of_the_stored_set(stream, stored):
+    assert stream.gear_names == stored.gear_names == ["pinion", "wheel"]
+    line = gensig.stream("experiment=two_stage", "plan.n_records=5")
+    attributes = root_attributes(line.config, read_machine(line.config))
+    assert line.gear_names == attributes["gear_names"]
+    assert len(line.gear_names) == 4
 
 
 def test_a_failed_record_has_the_values_of_a_stored_one():

@@ -44,6 +44,7 @@ class FakeDataset:
         self.attributes |= N_TEETH
         self.attributes["config_json"] = json.dumps({"plan": {"sham": sham}})
         self.signal_names = ["acceleration", "healthy_twin"][: 1 + twins]
+        self.gear_names = ["pinion", "wheel"]
         self.protocols = ("by_unit", "random_window_leaky")
         few = "1 specimen_id in the plan, and at least 4 are needed"
         self.left_out = {"cross_specimen": few, "new_machine": few}

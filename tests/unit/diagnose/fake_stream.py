@@ -28,7 +28,15 @@ class FakeStream:
         return FakeDataset(**shape, noise=self.noise, seed=self.epoch)
 
     def __getattr__(self, name):
-        if name in ("class_names", "channel_names", "n_samples", "protocols"):
+        if name in (
+            "class_names",
+            "channel_names",
+            "column_names",
+            "gear_names",
+            "n_samples",
+            "protocols",
+            "sampling_rate",
+        ):
             return getattr(self.dataset, name)
         raise AttributeError(name)
 
@@ -64,8 +72,11 @@ class FakeStream:
         dataset = self.dataset
         for number in self.numbers:
             status = "failed" if number in self.failed else "ok"
-            record_id = str(dataset.column("record_id")[number])
+            values = {
+                name: dataset.column(name)[number] for name in dataset.column_names
+            }
+            values["record_id"] = str(values["record_id"])
             yield FakeRecord(
                 signals={"acceleration": dataset.signals(number)},
-                values={"record_id": record_id, "status": status},
+                values={**values, "status": status},
             )
