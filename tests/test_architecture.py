@@ -82,7 +82,7 @@ GENSIG = {
     ),
     "production": (
         "dataset dynamics errors execution faults life options plan record sensing "
-        "systems units version"
+        "systems text units version"
     ),
     "record": (
         "dataset driveline dynamics errors faults geometry life operation options sensing "

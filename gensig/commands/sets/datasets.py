@@ -271,5 +271,6 @@ def plan(arguments: Namespace) -> int:
         step(f"making {n_timed} of {table.n_records} records to time them")
 
     for name, value in predict(request.config, on_plan=on_plan).items():
-        print(f"{name:<11}{value}")
+        indented = value.replace("\n", f"\n{'':<11}")
+        print(f"{name:<11}{indented}")
     return 0
