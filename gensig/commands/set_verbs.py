@@ -6,7 +6,10 @@ from gensig.commands.flags import (
     CONFIG_DIR,
     CONFIGURATION,
     FOLDER,
+    MULTIRUN,
+    OUT,
     QUIET,
+    WORKERS,
     Argument,
     Verb,
     count,
@@ -138,11 +141,9 @@ SET_VERBS = {
         runs="gensig.commands.sets.datasets:generate",
         arguments=(
             *CONFIGURATION,
-            switch(
-                "-m",
-                "--multirun",
-                help="one data set for each combination of values a,b",
-            ),
+            MULTIRUN,
+            OUT,
+            WORKERS,
             QUIET,
         ),
         status_1=INCOMPLETE,
@@ -156,6 +157,9 @@ SET_VERBS = {
         runs="gensig.commands.sets.datasets:plan",
         arguments=(
             *CONFIGURATION,
+            MULTIRUN,
+            OUT,
+            WORKERS,
             switch(
                 "--freeze",
                 help="make the folder out=DIR, ready for resume or array jobs",
@@ -182,7 +186,7 @@ SET_VERBS = {
         arguments=(
             FOLDER,
             overrides("executor=... and executor.key=...; other keys must agree"),
-            count("--workers", "N", "worker processes (default: one a core)"),
+            WORKERS,
             QUIET,
         ),
         status_1=INCOMPLETE,

@@ -19,7 +19,7 @@ from hydra import compose as hydra_compose
 from hydra import initialize_config_module
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import OverrideType, QuotedString
+from hydra.core.override_parser.types import Glob, OverrideType, QuotedString
 from hydra.errors import HydraException
 from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -27,9 +27,17 @@ from omegaconf.errors import OmegaConfBaseException
 from gensig.errors import ConfigError
 from gensig.options import files as option_files
 from gensig.options.configuration import Configuration
+from gensig.options.several_values import (
+    interval_text,
+    list_text,
+    several_values_text,
+)
+from gensig.options.shell_words import unquoted
 from gensig.text import nearest
 
 CONFIG_MODULE = "gensig.configs"
+# names under which faults of rolling bearings are looked for
+BEARING_FAULT = r"(?i)bearing|ball|roller|cage|(inner|outer)_?(race|ring)|bp[fs]|ftf"
 
 
 def compose(
@@ -128,19 +136,48 @@ def _composed(
             raise ConfigError(text) from None
 
 
-def sweep(overrides: Sequence[str]) -> list[list[str]]:
-    """Expand comma and range sweeps into one list of overrides a job (the Cartesian product,
-    first key slowest).
+def sweep(
+    overrides: Sequence[str], *, config_dir: str | Path | None = None
+) -> list[list[str]]:
+    """Expand sweeps into one list of overrides a job.
+
+    The jobs are the Cartesian product of the values, the first key slowest. ``glob(...)`` stands
+    for the options of a group whose names match, those of ``config_dir`` included.
+
+    Raises
+    ------
+    ConfigError    for a sweep without end, one that matches nothing, or one that Hydra refuses
     """
     jobs: list[list[str]] = [[]]
     for override in _parse(overrides):
         key = override.get_key_element()
         if override.is_sweep_override():
-            values = [f"{key}={value}" for value in override.sweep_string_iterator()]
+            values = [f"{key}={text}" for text in _swept(override, config_dir)]
         else:
             values = [override.input_line or key]
         jobs = [[*job, value] for job in jobs for value in values]
     return jobs
+
+
+def _swept(override: Any, config_dir: str | Path | None) -> list[str]:
+    """Values of a sweep as they are typed."""
+    key, line, value = str(override.key_or_group), override.input_line, override.value()
+    if override.is_interval_sweep():
+        raise ConfigError(interval_text(key, line, value.start, value.end))
+    if isinstance(value, Glob):
+        known = [option.name for option in option_files.options(key, config_dir)]
+        names = value.filter(known)
+        if not known:
+            raise ConfigError(
+                f"{line}: glob(...) stands for options of a group; '{key}' is none"
+            )
+        if not names:
+            raise ConfigError(f"{line} matches no option; there is {', '.join(known)}")
+        return names
+    try:
+        return list(override.sweep_string_iterator())
+    except (HydraException, ValueError, TypeError) as error:
+        raise ConfigError(f"{line}: {_first_line(error)}; give values A,B,C") from None
 
 
 def job_folders(jobs: Sequence[Sequence[str]]) -> list[str]:
@@ -157,39 +194,61 @@ def job_folders(jobs: Sequence[Sequence[str]]) -> list[str]:
 
 
 def override_keys(overrides: Sequence[str]) -> dict[str, str]:
-    """Keys and groups that were typed, each with its value as text; refuses a sweep."""
+    """Keys and groups that were typed, each with its value as text.
+
+    Raises
+    ------
+    ConfigError    for several values of a key that takes one; says what to type instead
+    """
     keys: dict[str, str] = {}
     for override in _parse(overrides):
+        key, line = str(override.key_or_group), str(override.input_line)
         if override.is_sweep_override():
-            raise ConfigError(
-                f"{override.input_line}: several values need -m (one data set for "
-                f"each){_list_hint(override)}"
-            )
-        keys[str(override.key_or_group)] = override.get_value_element_as_str()
+            raise ConfigError(_several_values(key, line, override, overrides))
+        value = override.value()
+        if isinstance(value, list):
+            default = _default(key, overrides)[1]
+            if text := list_text(key, line, _plain(value), default):
+                raise ConfigError(text)
+        keys[key] = override.get_value_element_as_str()
     return keys
 
 
-def _list_hint(override: Any) -> str:
-    """A hint where several values were meant as one: a decimal comma, a list without brackets."""
-    key, text = str(override.key_or_group), str(override.input_line).partition("=")[2]
-    parts = [part.strip() for part in text.split(",")]
-    is_decimal = re.fullmatch(r"[-+]?\d+, ?\d+", text) is not None
-    default = _default(key)
-    is_unknown_key = default is None and "." in key
-    if isinstance(default, ListConfig) or (is_unknown_key and not is_decimal):
-        return f"; or is it a list? Then write '{key}=[{','.join(parts)}]'"
-    if is_decimal:
-        return f"; or is it a decimal point? Then write {key}={'.'.join(parts)}"
-    return ""
+def _several_values(
+    key: str, line: str, override: Any, overrides: Sequence[str]
+) -> str:
+    """Advice for a sweep without ``-m``."""
+    value = override.value()
+    if override.is_interval_sweep():
+        return interval_text(key, line, value.start, value.end)
+    if isinstance(value, Glob):
+        values = _swept(override, None)
+    else:
+        values = [_plain(item) for item in override.sweep_iterator()]
+    primary, default = _default(key, overrides)
+    return several_values_text(key, line, values, default, primary)
 
 
-def _default(key: str) -> Any:
-    """Value of a dotted key in the first default configuration that has one."""
+def _default(key: str, overrides: Sequence[str]) -> tuple[str, Any]:
+    """Primary file of a dotted key, and its value in the packaged options that were chosen.
+
+    Null and an unknown key are None, of the first primary file.
+    """
+    heads = {word: word.partition("=")[0] for word in overrides}
+    chosen = [
+        word for word, head in heads.items() if head in _group_names() and head != key
+    ]
     for primary in option_files.PRIMARY:
-        value = OmegaConf.select(_chosen_options(primary, ()), key)
-        if value is not None:
-            return value
-    return None
+        for words in (tuple(chosen), ()):
+            try:
+                value = OmegaConf.select(_chosen_options(primary, words), key)
+            except (HydraException, OmegaConfBaseException, ValueError):
+                continue
+            if isinstance(value, ListConfig):
+                return primary, list(value)
+            if value is not None:
+                return primary, value
+    return option_files.PRIMARY[0], None
 
 
 def typed_mapping(overrides: Sequence[str], key: str) -> dict[str, Any]:
@@ -244,6 +303,9 @@ def _parse(overrides: Sequence[str]) -> list[Any]:
                 f"an override is a text such as 'seed=1', not {word!r}; give each as its "
                 "own argument"
             )
+    if advice := unquoted(overrides):
+        raise ConfigError(advice)
+    for word in overrides:
         if "=" not in word and not word.startswith("~"):
             text = (
                 "is neither group=option nor key=value, such as fault=crack or seed=1"
@@ -317,6 +379,11 @@ def _unknown_group(failure: _Failure) -> str:
 def _unknown_option(failure: _Failure) -> str:
     group, _, wanted = failure.name.rpartition("/")
     names = [option.name for option in option_files.options(group, failure.config_dir)]
+    if group == "fault" and re.match(BEARING_FAULT, wanted):
+        return (
+            f"no option '{wanted}' of fault: faults of bearings are not in this version; "
+            f"there is {', '.join(names)}"
+        )
     hint = option_files.elsewhere(group, wanted) or nearest.hint(wanted, names)
     return f"no option '{wanted}' of {group}; {hint}"
 

@@ -138,6 +138,10 @@ def read_manifest(folder: Path) -> Manifest:
     folder = Path(folder)
     path = folder / MANIFEST
     if not path.is_file():
+        if not folder.exists():
+            raise DatasetError(
+                f"{folder} does not exist; give the folder that `gensig generate` made"
+            )
         if (folder / BEGINNING).is_file():
             raise DatasetError(
                 f"{folder} holds no record: its run was killed before the plan was on disk; give "

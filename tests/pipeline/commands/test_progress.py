@@ -3,12 +3,13 @@
 import os
 import pty
 import re
+import shlex
 import subprocess
 import sys
 import time
 
 import pytest
-from small_sets import TINY
+from small_sets import TINY, contents, make
 
 from gensig.cli import main
 from gensig.commands import console
@@ -155,3 +156,34 @@ def test_an_edited_card_is_named_and_accepted_when_asked(data, capsys):
     said(0, "verify")
     shard_path(data, 3).write_bytes(b"short")
     assert "shard-00003.h5 is truncated" in said(1, "verify", "--quick")
+
+
+@pytest.mark.parametrize("folder", ["data", "my data"])
+def test_an_interruption_names_the_folder_to_resume(
+    folder, tmp_path, monkeypatch, capsys
+):
+    def interrupt(_progress, _state):
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    out = tmp_path / folder
+    with monkeypatch.context() as patch:
+        patch.setattr(ShardProgress, "__call__", interrupt)
+        assert main(["generate", "--quiet", *TINY, "-j", "1", "--out", folder]) == 130
+        first = capsys.readouterr().err
+        assert main(["resume", "--quiet", "--workers", "1", folder]) == 130
+        assert capsys.readouterr().err == first
+    words = shlex.split(first.partition("and ")[2].removesuffix(" finishes it\n"))
+    assert words == ["gensig", "resume", folder]
+    assert main([*words[1:], "--quiet", "-j", "1"]) == 0
+    plain = make(tmp_path / "plain")
+    assert contents(out) == contents(plain)
+
+
+def test_an_interruption_without_a_data_set_names_none(monkeypatch, capsys):
+    def interrupt(*_words):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gensig.commands.options.groups", interrupt)
+    assert main(["options"]) == 130
+    assert capsys.readouterr().err == "gensig: interrupted\n"

@@ -307,28 +307,27 @@ class TestSweeps:
         assert [job[0] for job in sweep([word])] == jobs
 
     def test_a_sweep_is_no_single_request(self):
-        with pytest.raises(ConfigError, match="several values need -m"):
+        with pytest.raises(ConfigError, match="several values, where one is needed"):
             override_keys(["seed=1,2"])
 
     @pytest.mark.parametrize(
         ("word", "instead"),
         [
-            ("operating.torque_nm=55,5", "Then write operating.torque_nm=55.5"),
+            ("operating.torque_nm=55,5", "Then type operating.torque_nm=55.5"),
             (
                 "protocols=by_unit,cross_specimen",
-                "Then write 'protocols=[by_unit,cross_specimen]'",
+                "a list is written 'protocols=[by_unit,cross_specimen]'",
             ),
-            ("plan.classes=healthy,crack", "Then write 'plan.classes=[healthy,crack]'"),
-            ("fault=healthy,crack", None),
-            ("operating.speed_rpm=1000,1500,2000", None),
+            (
+                "plan.classes=healthy,crack",
+                "a list is written 'plan.classes=[healthy,crack]'",
+            ),
         ],
     )
     def test_what_was_perhaps_meant_by_several_values(self, word, instead):
         with pytest.raises(ConfigError) as caught:
             override_keys([word])
-        assert str(caught.value).endswith(
-            instead or "several values need -m (one data set for each)"
-        )
+        assert instead in str(caught.value)
 
     def test_an_option_of_a_forgotten_folder_is_found(self, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
