@@ -21,31 +21,6 @@ LINE_SECONDS = 5.0
 LONG_SECONDS = 10.0  # without a record, after which the text explains the wait
 
 
-@contextmanager
-def one_line_warnings(program: str) -> Iterator[None]:
-    """Print each different warning once, as one line.
-
-    Of a category with the attribute ``once`` the first is printed only.
-    """
-    seen: set[object] = set()
-
-    def show(
-        message: Warning | str, category: type[Warning], *_details: Any, **_more: Any
-    ) -> None:
-        text = " ".join(str(message).split())
-        key: object = text
-        if getattr(category, "once", False):
-            key = category
-        if key not in seen:
-            seen.add(key)
-            print(f"{program}: note: {text}", file=sys.stderr)
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("always", UserWarning)
-        warnings.showwarning = show
-        yield
-
-
 def note(*texts: str) -> None:
     """Warn of each text; `one_line_warnings` prints it once however often it is true."""
     for text in texts:

@@ -93,7 +93,11 @@ def overrides(help: str) -> Argument:
     return text("overrides", "OVERRIDES", help, nargs="*")
 
 
-CONFIG_DIR = text("--config-dir", "DIR", "folder with groups and options of your own")
+CONFIG_DIR = text(
+    "--config-dir",
+    "DIR",
+    "folder with groups and options of your own (default: ./configs, if there)",
+)
 CONFIGURATION = (overrides(OVERRIDES_HELP), CONFIG_DIR)
 FOLDER = text("folder", "DIR", "folder of a data set")
 PLOT = text("--plot", "FILE", "write a figure (PNG, SVG or PDF)")

@@ -142,7 +142,7 @@ def sweep(
     """Expand sweeps into one list of overrides a job.
 
     The jobs are the Cartesian product of the values, the first key slowest. ``glob(...)`` stands
-    for the options of a group whose names match, those of ``config_dir`` included.
+    for the options of a group whose names match, those of ``config_dir`` or ./configs included.
 
     Raises
     ------
@@ -165,7 +165,8 @@ def _swept(override: Any, config_dir: str | Path | None) -> list[str]:
     if override.is_interval_sweep():
         raise ConfigError(interval_text(key, line, value.start, value.end))
     if isinstance(value, Glob):
-        known = [option.name for option in option_files.options(key, config_dir)]
+        folder = config_dir or option_files.user_folder()
+        known = [option.name for option in option_files.options(key, folder)]
         names = value.filter(known)
         if not known:
             raise ConfigError(
@@ -384,7 +385,7 @@ def _unknown_option(failure: _Failure) -> str:
             f"no option '{wanted}' of fault: faults of bearings are not in this version; "
             f"there is {', '.join(names)}"
         )
-    hint = option_files.elsewhere(group, wanted) or nearest.hint(wanted, names)
+    hint = nearest.hint(wanted, names)
     return f"no option '{wanted}' of {group}; {hint}"
 
 

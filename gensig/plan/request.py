@@ -17,6 +17,7 @@ from gensig.life.life_options import RUN_TO_FAILURE
 from gensig.options import files as option_files
 from gensig.options.compose import compose, options, override_keys, typed_mapping
 from gensig.options.configuration import Configuration
+from gensig.options.own_options import with_own_options
 from gensig.plan.condition_courses import settle_courses
 from gensig.record.options import AS_GIVEN
 from gensig.systems.registry import SIDES
@@ -48,6 +49,7 @@ def read_request(
 ) -> Request:
     """Compose the configuration for one job.
 
+    Options that the package does not have are looked for in ``config_dir``, else in ./configs.
     A ``fault.key=value`` is applied to every class of the plan whose option has that key, and
     pinned there. The whole configuration is composed once; fault options of classes are composed
     alone.
@@ -57,6 +59,15 @@ def read_request(
     ConfigError    with one line, for anything that cannot be used
     """
     words = _typed_words(overrides)
+    return with_own_options(
+        lambda folder: _request(words, tuple(overrides), folder), config_dir
+    )
+
+
+def _request(
+    words: _Words, overrides: tuple[str, ...], config_dir: str | Path | None
+) -> Request:
+    """Request of typed words; options of one's own are those of ``config_dir``."""
     base = compose(CONFIG_NAME, words.others, config_dir=config_dir).plain()
     _check_shape(base)
     notes = _plan_of_life(words, base)
@@ -95,7 +106,7 @@ def read_request(
     }
     _reset_derived(base["gear"], set(words.keys) | set(base["plan"]["vary"]))
     config = settle_courses(Configuration(base), words.keys)
-    return Request(config=config, overrides=tuple(overrides), notes=tuple(notes))
+    return Request(config=config, overrides=overrides, notes=tuple(notes))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -329,19 +329,6 @@ class TestSweeps:
             override_keys([word])
         assert instead in str(caught.value)
 
-    def test_an_option_of_a_forgotten_folder_is_found(self, tmp_path, monkeypatch):
-        monkeypatch.chdir(tmp_path)
-        file = tmp_path / "configs" / "gear" / "mine.yaml"
-        file.parent.mkdir(parents=True)
-        file.write_text("{}")
-        hint = (
-            r"no option 'mine' of gear; it is in \./configs: add --config-dir configs"
-        )
-        with pytest.raises(ConfigError, match=hint):
-            read_request(["gear=mine"])
-        with pytest.raises(ConfigError, match="no option 'other' of gear; there is"):
-            read_request(["gear=other"])
-
 
 def test_paper_experiment_means_every_convention_of_the_paper_and_no_noise():
     config = read_request(["experiment=paper"]).config
