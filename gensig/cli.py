@@ -58,7 +58,7 @@ def _run_verb(name: str, words: list[str]) -> int:
         arguments = verb_parser(name).parse_intermixed_args(words)
     except SystemExit as leaving:
         return int(leaving.code or 0)
-    from gensig.terminal.notes import one_line_warnings
+    from gensig.terminal.warning_lines import one_line_warnings
 
     module, function = verb.runs.split(":")
     with one_line_warnings(PROGRAM):

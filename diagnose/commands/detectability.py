@@ -10,7 +10,7 @@ from pathlib import Path
 
 from diagnose.commands.parser import add_overrides
 from gensig.errors import ConfigError
-from gensig.terminal.notes import one_line_warnings
+from gensig.terminal.warning_lines import one_line_warnings
 
 HELP = """\
 Which test shows the fault? Maps over speed, torque, channel and bandwidth, without any training.

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from diagnose.commands.parser import add_overrides, refuse_existing
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
-from gensig.terminal.notes import one_line_warnings
+from gensig.terminal.warning_lines import one_line_warnings
 
 if TYPE_CHECKING:
     from diagnose.data.windows import Task

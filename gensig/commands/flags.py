@@ -108,6 +108,11 @@ MULTIRUN = switch(
 )
 # flags for keys that people look for among the flags
 OUT = text("--out", "DIR", "the same as out=DIR", dest="out_flag")
+STORED = text(
+    "--config",
+    "FILE",
+    "configuration of a data set, its config.yaml, in place of the options; OVERRIDES change it",
+)
 WORKERS = Argument(
     ("-j", "--workers"),
     {

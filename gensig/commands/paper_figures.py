@@ -8,7 +8,7 @@ from pathlib import Path
 
 from gensig.commands.console import replaced_file
 from gensig.errors import ConfigError
-from gensig.terminal.notes import one_line_warnings
+from gensig.terminal.warning_lines import one_line_warnings
 
 WIDTH = 90  # letters of a line of a reason
 

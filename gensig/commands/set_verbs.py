@@ -9,6 +9,7 @@ from gensig.commands.flags import (
     MULTIRUN,
     OUT,
     QUIET,
+    STORED,
     WORKERS,
     Argument,
     Verb,
@@ -137,10 +138,12 @@ SET_VERBS = {
         examples=(
             "gensig generate experiment=quickstart out=runs/quickstart",
             "gensig generate -m fault=healthy,crack plan.n_records=20 out=runs/two",
+            "gensig generate --config runs/quickstart/config.yaml seed=2 out=runs/other",
         ),
         runs="gensig.commands.sets.datasets:generate",
         arguments=(
             *CONFIGURATION,
+            STORED,
             MULTIRUN,
             OUT,
             WORKERS,
@@ -153,10 +156,12 @@ SET_VERBS = {
         examples=(
             "gensig plan experiment=quickstart plan.n_records=2000",
             "gensig plan experiment=quickstart out=runs/large --freeze",
+            "gensig plan experiment=quickstart fault=crack --show-config",
         ),
         runs="gensig.commands.sets.datasets:plan",
         arguments=(
             *CONFIGURATION,
+            STORED,
             MULTIRUN,
             OUT,
             WORKERS,
@@ -164,6 +169,11 @@ SET_VERBS = {
                 "--freeze",
                 help="make the folder out=DIR, ready for resume or array jobs",
             ),
+            switch(
+                "--show-config",
+                help="print the configuration as YAML, and nothing else",
+            ),
+            Argument(("--cfg",), {"choices": ("job",), "help": "as --show-config"}),
         ),
     ),
     "new": Verb(

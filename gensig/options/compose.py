@@ -88,12 +88,12 @@ def _set_in_options(config_name: str, words: tuple[str, ...]) -> Configuration:
     ConfigError    for words other than ``group=option`` and ``key=value``; Hydra's errors
     """
     chosen, changes = [], []
-    for word, override in zip(words, _parse(words), strict=True):
+    for word, override in zip(words, parse(words), strict=True):
         is_change = override.type is OverrideType.CHANGE and override.package is None
         if not is_change or override.is_sweep_override():
             raise ConfigError(f"'{word}' is not only a change of a value")
         key, value = override.key_or_group, override.value()
-        is_group = key in _group_names() or "/" in key
+        is_group = key in group_names() or "/" in key
         if is_group and isinstance(value, dict):
             raise ConfigError(f"'{word}' changes values of a group")
         if is_group:
@@ -119,9 +119,37 @@ def _resolved(config: DictConfig) -> Configuration:
     return Configuration({str(key): value for key, value in values.items()})
 
 
+def composed_groups(
+    config_name: str, words: Sequence[str], *, config_dir: str | Path | None
+) -> dict[str, Any]:
+    """A composition as plain nested dictionaries whose references are not resolved yet.
+
+    Raises
+    ------
+    ConfigError    for an unknown group or option
+    """
+    content = OmegaConf.to_container(
+        _hydra_composed(config_name, tuple(words), config_dir), resolve=False
+    )
+    assert isinstance(content, dict)
+    return {str(key): value for key, value in content.items()}
+
+
 def _composed(
     config_name: str, words: tuple[str, ...], config_dir: str | Path | None
 ) -> Configuration:
+    config = _hydra_composed(config_name, words, config_dir)
+    try:
+        return _resolved(config)
+    except (OmegaConfBaseException, ValueError) as error:
+        text = _explain(error, config_name, words, config_dir)
+        raise ConfigError(text) from None
+
+
+def _hydra_composed(
+    config_name: str, words: tuple[str, ...], config_dir: str | Path | None
+) -> DictConfig:
+    """A composition whose references are not resolved yet."""
     searched = list(words)
     if config_dir is not None:
         folder = Path(config_dir).expanduser().resolve()
@@ -130,7 +158,7 @@ def _composed(
         searched.append(f"hydra.searchpath=[file://{folder}]")
     with _hydra():
         try:
-            return _resolved(hydra_compose(config_name=config_name, overrides=searched))
+            return hydra_compose(config_name=config_name, overrides=searched)
         except (HydraException, OmegaConfBaseException, ValueError) as error:
             text = _explain(error, config_name, words, config_dir)
             raise ConfigError(text) from None
@@ -149,7 +177,7 @@ def sweep(
     ConfigError    for a sweep without end, one that matches nothing, or one that Hydra refuses
     """
     jobs: list[list[str]] = [[]]
-    for override in _parse(overrides):
+    for override in parse(overrides):
         key = override.get_key_element()
         if override.is_sweep_override():
             values = [f"{key}={text}" for text in _swept(override, config_dir)]
@@ -202,7 +230,7 @@ def override_keys(overrides: Sequence[str]) -> dict[str, str]:
     ConfigError    for several values of a key that takes one; says what to type instead
     """
     keys: dict[str, str] = {}
-    for override in _parse(overrides):
+    for override in parse(overrides):
         key, line = str(override.key_or_group), str(override.input_line)
         if override.is_sweep_override():
             raise ConfigError(_several_values(key, line, override, overrides))
@@ -237,7 +265,7 @@ def _default(key: str, overrides: Sequence[str]) -> tuple[str, Any]:
     """
     heads = {word: word.partition("=")[0] for word in overrides}
     chosen = [
-        word for word, head in heads.items() if head in _group_names() and head != key
+        word for word, head in heads.items() if head in group_names() and head != key
     ]
     for primary in option_files.PRIMARY:
         for words in (tuple(chosen), ()):
@@ -258,7 +286,7 @@ def typed_mapping(overrides: Sequence[str], key: str) -> dict[str, Any]:
     Such a mapping may have names that no option has yet.
     """
     result: dict[str, Any] = {}
-    for override in _parse([word for word in overrides if word.startswith(f"{key}=")]):
+    for override in parse([word for word in overrides if word.startswith(f"{key}=")]):
         value = override.value()
         if not isinstance(value, dict):
             raise ConfigError(
@@ -297,7 +325,13 @@ class _hydra:
         GlobalHydra.instance().clear()
 
 
-def _parse(overrides: Sequence[str]) -> list[Any]:
+def parse(overrides: Sequence[str]) -> list[Any]:
+    """Hydra's reading of overrides.
+
+    Raises
+    ------
+    ConfigError    for a word that is no override; says which to quote
+    """
     for word in overrides:
         if not isinstance(word, str):
             raise ConfigError(
@@ -342,8 +376,8 @@ def _explain(
 
 def _not_an_option(words: Sequence[str]) -> str | None:
     """Message for the first group that was given a number or a mapping."""
-    groups = _group_names()
-    for override in _parse(words):
+    groups = group_names()
+    for override in parse(words):
         key = str(override.key_or_group)
         if key in groups and not isinstance(override.value(), str | list):
             names = ", ".join(options(key))
@@ -363,14 +397,14 @@ class _Failure:
 
 def _unknown_key(failure: _Failure) -> str:
     keys = _known_keys(failure)
-    return f"unknown key '{failure.name}'{_nearest(failure.name, keys)}"
+    return f"unknown key '{failure.name}'{nearest_key(failure.name, keys)}"
 
 
 def _unknown_group(failure: _Failure) -> str:
     files = {group.name: group.primary for group in option_files.groups()}
     primary = files.get(failure.name)
     if primary is None:
-        return f"unknown group '{failure.name}'{_nearest(failure.name, list(files))}"
+        return f"unknown group '{failure.name}'{nearest_key(failure.name, list(files))}"
     return (
         f"the group '{failure.name}' is one of {primary}.yaml, "
         f"not of {failure.config_name}.yaml"
@@ -400,31 +434,33 @@ _EXPLANATIONS: dict[str, Callable[[_Failure], str]] = {
 
 def _known_keys(failure: _Failure) -> list[str]:
     """Dotted keys of the default configuration with the groups that were chosen."""
-    groups = _group_names()
+    groups = group_names()
     words = [word for word in failure.words if word.partition("=")[0] in groups]
     try:
         config = _chosen_options(failure.config_name, tuple(words))
     except HydraException:
         config = _chosen_options(failure.config_name, ())
-    return list(_dotted(OmegaConf.to_container(config, resolve=False)))
+    return list(dotted_keys(OmegaConf.to_container(config, resolve=False)))
 
 
 @functools.cache
-def _group_names() -> frozenset[str]:
+def group_names() -> frozenset[str]:
+    """Names of all groups of the package."""
     with _hydra() as hydra:
         return frozenset(hydra.config_loader().list_groups(""))
 
 
-def _dotted(tree: Any, prefix: str = "") -> list[str]:
+def dotted_keys(tree: Any, prefix: str = "") -> list[str]:
+    """Keys of nested dictionaries, groups included."""
     if not isinstance(tree, dict):
         return []
     keys = []
     for key, value in tree.items():
-        keys += [f"{prefix}{key}", *_dotted(value, f"{prefix}{key}.")]
+        keys += [f"{prefix}{key}", *dotted_keys(value, f"{prefix}{key}.")]
     return keys
 
 
-def _nearest(key: str, names: Sequence[str]) -> str:
+def nearest_key(key: str, names: Sequence[str]) -> str:
     """'; did you mean ...?' over whole keys, then over their last part."""
     close = difflib.get_close_matches(key, names, n=3, cutoff=0.6)
     if not close:

@@ -23,7 +23,6 @@ UNKNOWN = "unrecognized arguments: "
 MISSING = "the following arguments are required: "
 # flags that people type for keys of the overrides
 KEYS_FOR_FLAGS = {
-    "--config": "group=option and key=value; --config-dir names a folder of options",
     "--data": "data=DIR",
     "--out": "out=DIR",
     "--seed": "seed=N",

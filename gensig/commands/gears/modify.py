@@ -22,7 +22,7 @@ from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification, PairModification
 from gensig.systems.flank_optimum import Cases, Optimum, judge, optimise
 from gensig.systems.sliced_pair import SlicedPair
-from gensig.terminal.notes import one_line_warnings
+from gensig.terminal.warning_lines import one_line_warnings
 from gensig.units import from_si
 
 GROUP = "modification"

@@ -37,7 +37,7 @@ from gensig.life.wear.wear_life import WearLife, hours, wear_life
 from gensig.operation.options import read_operating
 from gensig.record.vibration_limit import WornVibration, limited_by_vibration
 from gensig.systems.wear import read_wear_case, wear_fault
-from gensig.terminal.notes import one_line_warnings
+from gensig.terminal.warning_lines import one_line_warnings
 
 Array = NDArray[np.float64]
 

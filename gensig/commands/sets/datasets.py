@@ -13,7 +13,7 @@ import yaml
 
 from gensig.commands.console import ShardProgress, note, remark, step
 from gensig.commands.sets.jobs import Job, read_jobs, typed_words
-from gensig.dataset.folder.beginning import refuse_used
+from gensig.dataset.folder.beginning import config_text, refuse_used
 from gensig.dataset.folder.failures import commonest, failure_reasons
 from gensig.dataset.folder.joining import joined_folder
 from gensig.dataset.folder.layout import CONFIG_BYTES_LIMIT, MANIFEST, OVERRIDES
@@ -22,7 +22,7 @@ from gensig.dataset.storage.atomic import read_text
 from gensig.errors import ConfigError, Interrupted
 from gensig.options.compose import override_keys
 from gensig.options.configuration import Configuration
-from gensig.plan.request import Request, read_request
+from gensig.plan.request import STORED_FLAG, Request, read_request
 
 if TYPE_CHECKING:
     from gensig.dataset.plan import Plan
@@ -104,7 +104,7 @@ def _generate_share(executor: Executor, arguments: Namespace) -> int:
         n_records=sum(manifest.shards[index].rows for index in mine),
         n_shards=len(mine),
         begin=begin,
-        asked=_asked(out, words, arguments.config_dir),
+        asked=_asked(out, words, arguments.config_dir, arguments.config),
         of_task=True,
     )
 
@@ -158,13 +158,19 @@ def _run(
 
 
 def _asked(
-    out: Path, overrides: Sequence[str], config_dir: str | None = None
+    out: Path,
+    overrides: Sequence[str],
+    config_dir: str | None = None,
+    stored: str | None = None,
 ) -> Configuration | None:
     """Configuration of a folder's recorded overrides and those typed now.
 
-    None where the typed ones change nothing that decides bits.
+    ``stored`` is the file of ``--config``, which takes the place of the recorded ones. None where
+    the typed ones change nothing that decides bits.
     """
     words = [word for word in overrides if not _is_free(word)]
+    if stored is not None:
+        return read_request(words, config_dir=config_dir, stored=stored).config
     if not words:
         return None
     keys = {_key(word) for word in words}
@@ -172,6 +178,8 @@ def _asked(
     recorded = []
     if isinstance(content, list):
         recorded = [str(word) for word in content]
+    if recorded and recorded[0].startswith(STORED_FLAG):
+        return read_request(words, config_dir=config_dir, stored=out).config
     kept = [word for word in recorded if not _is_free(word) and _key(word) not in keys]
     try:
         return read_request([*kept, *words], config_dir=config_dir).config
@@ -256,6 +264,8 @@ def _print_failed(out: Path, n_failed: int, n_records: int) -> None:
 def plan(arguments: Namespace) -> int:
     """Print records, bytes and time of each data set; with --freeze make its folder too."""
     jobs = read_jobs(arguments)
+    if arguments.show_config or arguments.cfg is not None:
+        return _show_configurations(jobs)
     if arguments.freeze:
         if jobs[0].folder is None:
             raise ConfigError(
@@ -267,6 +277,15 @@ def plan(arguments: Namespace) -> int:
         if job.name:
             print("\n" * (number > 0) + job.name, flush=True)
         _plan(job, freeze=arguments.freeze)
+    return 0
+
+
+def _show_configurations(jobs: Sequence[Job]) -> int:
+    """Print the configuration of each data set as its ``config.yaml`` would hold it."""
+    for job in jobs:
+        if job.name:
+            print(f"--- # {job.name}")
+        print(config_text(job.request.config.with_entries(out=None).plain()), end="")
     return 0
 
 

@@ -56,7 +56,9 @@ def read_jobs(arguments: Namespace) -> list[Job]:
     if arguments.multirun:
         combinations = sweep(words, config_dir=arguments.config_dir)
     requests = [
-        read_request(combination, config_dir=arguments.config_dir)
+        read_request(
+            combination, config_dir=arguments.config_dir, stored=arguments.config
+        )
         for combination in combinations
     ]
     parents = {str(request.config["out"] or "") for request in requests}

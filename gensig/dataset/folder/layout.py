@@ -260,7 +260,11 @@ def read_config(folder: Path) -> ConfigContent:
 
     DatasetError when it is anything else.
     """
-    path = Path(folder) / CONFIG
+    return read_config_file(Path(folder) / CONFIG)
+
+
+def read_config_file(path: Path) -> ConfigContent:
+    """A configuration as plain data, see `read_config`."""
     text = read_text(path, limit=CONFIG_BYTES_LIMIT)
     try:
         _refuse_yaml_bombs(text, path)
