@@ -191,7 +191,9 @@ def _swept(override: Any, config_dir: str | Path | None) -> list[str]:
     """Values of a sweep as they are typed."""
     key, line, value = str(override.key_or_group), override.input_line, override.value()
     if override.is_interval_sweep():
-        raise ConfigError(interval_text(key, line, value.start, value.end))
+        primary = _default(key, [])[0]
+        text = interval_text(key, line, value.start, value.end, primary)
+        raise ConfigError(text)
     if isinstance(value, Glob):
         folder = config_dir or option_files.user_folder()
         known = [option.name for option in option_files.options(key, folder)]
@@ -249,7 +251,8 @@ def _several_values(
     """Advice for a sweep without ``-m``."""
     value = override.value()
     if override.is_interval_sweep():
-        return interval_text(key, line, value.start, value.end)
+        primary = _default(key, overrides)[0]
+        return interval_text(key, line, value.start, value.end, primary)
     if isinstance(value, Glob):
         values = _swept(override, None)
     else:
@@ -261,8 +264,11 @@ def _several_values(
 def _default(key: str, overrides: Sequence[str]) -> tuple[str, Any]:
     """Primary file of a dotted key, and its value in the packaged options that were chosen.
 
-    Null and an unknown key are None, of the first primary file.
+    A group is an empty mapping, and an unknown key None, of the first primary file.
     """
+    primaries = {group.name: group.primary for group in option_files.groups()}
+    if key in primaries:
+        return primaries[key], {}
     heads = {word: word.partition("=")[0] for word in overrides}
     chosen = [
         word for word, head in heads.items() if head in group_names() and head != key
@@ -270,14 +276,16 @@ def _default(key: str, overrides: Sequence[str]) -> tuple[str, Any]:
     for primary in option_files.PRIMARY:
         for words in (tuple(chosen), ()):
             try:
-                value = OmegaConf.select(_chosen_options(primary, words), key)
+                config = _chosen_options(primary, words)
+                value = OmegaConf.select(config, key)
             except (HydraException, OmegaConfBaseException, ValueError):
                 continue
             if isinstance(value, ListConfig):
                 return primary, list(value)
-            if value is not None:
+            known = dotted_keys(OmegaConf.to_container(config, resolve=False))
+            if value is not None or key in known:
                 return primary, value
-    return option_files.PRIMARY[0], None
+    return primaries.get(key.partition(".")[0], option_files.PRIMARY[0]), None
 
 
 def typed_mapping(overrides: Sequence[str], key: str) -> dict[str, Any]:

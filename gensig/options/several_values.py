@@ -26,18 +26,21 @@ def several_values_text(
     ----------
     key, line : the key, and the override as it was typed
     values : the several values
-    default : value of the key in the chosen options; None where it is null or unknown
+    default : value of the key in the chosen options; None where it is null or unknown, an empty
+        mapping for a group
     primary : primary file of the key, ``generate`` or ``train``
     """
     parts = [
         f"{line}: several values, where one is needed",
-        *_instead(key, line, values, default),
+        *_instead(key, line, values, default, primary),
         MULTIRUN[primary],
     ]
     return "; ".join(parts)
 
 
-def _instead(key: str, line: str, values: Sequence[Any], default: Any) -> list[str]:
+def _instead(
+    key: str, line: str, values: Sequence[Any], default: Any, primary: str
+) -> list[str]:
     """Words to type in place of several values."""
     typed = line.partition("=")[2]
     is_decimal = re.fullmatch(r"[-+]?\d+,\d+", typed) is not None
@@ -51,8 +54,9 @@ def _instead(key: str, line: str, values: Sequence[Any], default: Any) -> list[s
         point = typed.replace(",", ".")
         advice.append(f"a decimal comma? Then type {key}={point}")
     if _are_numbers(values) and not isinstance(default, str | bool):
-        advice += varied_instead(key, values)
-    elif "." in key and default is None:
+        if primary != TRAIN:
+            advice += varied_instead(key, values)
+    elif default is None:
         advice.append(f"a list is written '{key}=[{listed}]'")
     return advice
 
@@ -63,14 +67,15 @@ def varied_instead(key: str, values: Sequence[Any]) -> list[str]:
     return _varied(key, f"distribution: choice, values: [{numbers}]")
 
 
-def interval_text(key: str, line: str, low: float, high: float) -> str:
+def interval_text(key: str, line: str, low: float, high: float, primary: str) -> str:
     """Advice for ``interval(low,high)``, which has no end of values."""
     limits = f"low: {low:g}, high: {high:g}"
     parts = [
         f"{line}: an interval has no end of values; -m takes {key}=A,B or "
         f"{key}=range({low:g},{high:g},STEP)",
-        *_varied(key, f"distribution: uniform, {limits}"),
     ]
+    if primary != TRAIN:
+        parts += _varied(key, f"distribution: uniform, {limits}")
     return "; ".join(parts)
 
 

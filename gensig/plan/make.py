@@ -23,7 +23,13 @@ from gensig.life.life_options import runs_to_failure
 from gensig.life.options import read_wear_options
 from gensig.mesh.pair_table import check_teeth
 from gensig.options.configuration import Configuration
-from gensig.plan.draws import draw_class_faults, draw_values, fault_sizes, fault_specs
+from gensig.plan.draws import (
+    draw_class_faults,
+    draw_values,
+    drawn_gears,
+    fault_sizes,
+    fault_specs,
+)
 from gensig.plan.lives import snapshots
 from gensig.plan.unit_designs import UnitDesigns, check_designs, draw_designs
 from gensig.record.gear_columns import gear_columns
@@ -43,8 +49,8 @@ from gensig.systems.pair_machine import severity
 from gensig.units import from_si
 
 # Records of a shard where the number is not given: small shards keep a few workers busy to the
-# end, a large set has few files, and a shard is soon read, copied and made again.
-LEAST_IN_SHARD, MOST_SHARDS, MOST_SHARD_BYTES = 24, 1000, 1_000_000_000
+# end, a large set has few files, and every worker builds its shard in memory.
+LEAST_IN_SHARD, MOST_SHARDS, MOST_SHARD_BYTES = 24, 1000, 500_000_000
 LANES = 8  # records that are integrated together; whole groups of them cost least
 MOST_IN_GRID = 1_000_000  # records; a product of levels is soon larger than meant
 COUNT_BYTES = 2  # of a sample stored as an int16 count
@@ -330,13 +336,26 @@ def describe_design(config: Configuration) -> str:
 
 
 def varied_keys(config: Configuration) -> dict[str, str]:
-    """Key that a plan varies -> its range in words; keys of faults begin with their class."""
+    """Key that a plan varies -> its range in words; keys of faults begin with their class.
+
+    Sizes of faults that are shares of a tooth are those of the configured gear.
+    """
     varied = {
         key: distribution.text
         for key, distribution in read_plan_options(config).vary.items()
     }
     if draws_unit_load(config):
         varied[TORQUE_KEY] += " of unit load, N/mm2"
+    if runs_to_failure(config):
+        grown = "grows along each life"
+        return varied | {
+            name: grown
+            for name, fault in config["classes"].items()
+            if fault_parts(fault)
+        }
+    if gears := drawn_gears(config):
+        sizes = "sizes and teeth below are of the configured gear"
+        varied["fault_gear"] = f"{', '.join(gears)}; {sizes}"
     for name, vary in _fault_varies(config).items():
         varied |= {f"{name}.{key}": vary[key].text for key in vary}
     return varied
@@ -427,14 +446,19 @@ def records_per_shard(config: Configuration, n_records: int) -> int:
     """Number of records of a shard, as configured or for a set of ``n_records``.
 
     Where it is not configured, it grows with the set: 24 up to 24,000 records, then as many as
-    make 1,000 shards. The samples of a shard take at most 1 GB.
+    make 1,000 shards. The samples of a shard take at most 500 MB.
     """
     given = read_dataset_options(config).records_per_shard
     if given is not None:
         return given
     groups = math.ceil(n_records / (MOST_SHARDS * LANES))
     wanted = max(LEAST_IN_SHARD, groups * LANES)
-    return max(1, min(wanted, MOST_SHARD_BYTES // record_bytes(config)))
+    fitting = MOST_SHARD_BYTES // record_bytes(config)
+    if wanted <= fitting:
+        return wanted
+    if fitting < LANES:
+        return max(1, fitting)
+    return fitting // LANES * LANES
 
 
 def record_bytes(config: Configuration, *, as_stored: bool = False) -> int:

@@ -91,11 +91,14 @@ def test_what_is_one_for_a_data_set_is_not_to_be_drawn(word, absent):
 
 
 def test_keys_of_a_training_are_told_of_its_own_command():
-    text, _ = advised(["epochs=3,4"])
-    assert "diagnose train -m" in text or "gensig generate -m" in text
-    text, _ = advised(["learning_rate=0.1,0.2"])
-    assert "diagnose train -m makes one run for each" in text
-    assert "plan.vary" not in text
+    for word in ("epochs=3,4", "learning_rate=0.1,0.2", "model=cnn,wdcnn"):
+        text, advice = advised([word])
+        assert text.endswith("diagnose train -m makes one run for each")
+        assert advice == []
+    words = ["model=cnn", "model.n_channels=16,32"]
+    assert "plan.vary" not in advised(words)[0]
+    assert advised(["classes=healthy,crack"])[1] == ["classes=[healthy,crack]"]
+    assert advised(["experiment=quickstart,helical"])[1] == []
 
 
 def test_a_list_stays_a_list_where_one_is_right():

@@ -81,7 +81,16 @@ def test_every_varied_key_has_a_line_with_its_range():
     )
     assert varied["sensing.snr_db"] == "10 to 30"
     assert "crack.crack_depth_mm" not in varied  # which is given
+    assert varied["fault_gear"].startswith("pinion, wheel; ")
     assert set(config["plan"]["vary"]) < set(varied)
+
+
+def test_faults_of_lives_grow():
+    config = read_request(["experiment=run_to_failure"]).config
+    varied = varied_keys(config)
+    grown = {name for name, text in varied.items() if text == "grows along each life"}
+    assert grown == set(config["classes"])
+    assert set(varied) - grown == set(config["plan"]["vary"])
 
 
 def test_records_that_fail_while_they_are_timed_are_told(monkeypatch):
