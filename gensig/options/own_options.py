@@ -54,5 +54,5 @@ def say_read() -> None:
     warnings.warn(
         f"./{USER_FOLDER} is read for options of your own; --config-dir DIR names another folder",
         OwnOptionsWarning,
-        stacklevel=3,
+        stacklevel=4,  # the caller of read_request
     )

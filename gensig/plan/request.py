@@ -335,5 +335,5 @@ def _reset_derived(gear: dict[str, Any], touched: set[str]) -> None:
                     "derived from a solid disc now"
                 ),
                 DerivedValueWarning,
-                stacklevel=3,
+                stacklevel=6,  # the caller of read_request
             )

@@ -31,6 +31,8 @@ KEYS_FOR_FLAGS = {
     "--fault": "fault=NAME",
     "--gear": "gear=NAME",
 }
+MULTIRUN_FLAGS = ("-m", "--multirun")
+OF_MULTIRUN = "gensig generate, gensig plan and diagnose train"
 NUMBERS: dict[Any, str] = {int: "whole number", float: "number"}
 
 
@@ -108,6 +110,8 @@ class Parser(argparse.ArgumentParser):
         known = [name for name in self._option_string_actions if name.startswith("--")]
         name, equals, _ = word.partition("=")
         takes_keys = any(action.dest == "overrides" for action in self._actions)
+        if name in MULTIRUN_FLAGS:
+            return f"no flag '{name}' here: {OF_MULTIRUN} take it"
         begun = any(flag.startswith(name) for flag in known)
         is_key = takes_keys and name in KEYS_FOR_FLAGS and not begun
         if equals and (is_key or not nearest.near(name, known)):

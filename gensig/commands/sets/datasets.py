@@ -123,15 +123,18 @@ def _run(
     """Make the shards that a folder, or a task's share of it, lacks; returns the exit status."""
     from gensig.production.folder import run_folder
 
-    advice = f"{out} is incomplete; gensig resume {out} tries the missing shards again"
+    folder = shlex.quote(str(out))
+    advice = (
+        f"{out} is incomplete; gensig resume {folder} tries the missing shards again"
+    )
     records = f"{n_records} records"
-    following = f"gensig inspect {out} describes them"
-    going_on = f"and gensig resume {shlex.quote(str(out))} finishes it"
+    following = f"gensig inspect {folder} describes them"
+    going_on = f"and gensig resume {folder} finishes it"
     if of_task:
         going_on = "and the same command goes on with this task's share"
         advice = "this task's share is incomplete; the same command tries again"
         records += " of this task"
-        following = f"gensig finalize {out}"
+        following = f"gensig finalize {folder}"
     progress = ShardProgress(
         quiet=arguments.quiet,
         n_records=n_records,

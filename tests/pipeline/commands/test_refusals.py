@@ -68,6 +68,8 @@ REFUSED = {
     "gensig generate --config none out=x": "--config none does not exist",
     "gensig simulate --config x": "did you mean '--config-dir'?",
     "gensig plan --cfg hydra": "is not one of job",
+    "gensig simulate -m fault=crack,wear": "gensig generate, gensig plan and diagnose",
+    "gensig stiffness --multirun seed=1,2": "gensig generate, gensig plan and diagnose",
     "gensig generate --out x out=y": "out is given as a flag too",
     "gensig generate -j 0 out=x": "executor.n_workers = 0",
     "gensig stiffness --seed 3": "no flag '--seed'; type seed=N",
