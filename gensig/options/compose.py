@@ -9,16 +9,14 @@ from __future__ import annotations
 import copy
 import difflib
 import functools
+import itertools
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from hydra import compose as hydra_compose
-from hydra import initialize_config_module
-from hydra.core.global_hydra import GlobalHydra
-from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Glob, OverrideType, QuotedString
 from hydra.errors import HydraException
 from omegaconf import DictConfig, ListConfig, OmegaConf
@@ -27,15 +25,21 @@ from omegaconf.errors import OmegaConfBaseException
 from gensig.errors import ConfigError
 from gensig.options import files as option_files
 from gensig.options.configuration import Configuration
+from gensig.options.groups import (
+    HydraState,
+    first_line,
+    group_names,
+    options,
+    parse,
+)
 from gensig.options.several_values import (
+    MOST_ADVISED,
     interval_text,
     list_text,
     several_values_text,
 )
-from gensig.options.shell_words import unquoted
 from gensig.text import nearest
 
-CONFIG_MODULE = "gensig.configs"
 # names under which faults of rolling bearings are looked for
 BEARING_FAULT = r"(?i)bearing|ball|roller|cage|(inner|outer)_?(race|ring)|bp[fs]|ftf"
 
@@ -109,7 +113,7 @@ def _set_in_options(config_name: str, words: tuple[str, ...]) -> Configuration:
 @functools.lru_cache(maxsize=64)
 def _chosen_options(config_name: str, words: tuple[str, ...]) -> DictConfig:
     """Composition of the package's options, interpolations unresolved; not to be changed."""
-    with _hydra():
+    with HydraState():
         return hydra_compose(config_name=config_name, overrides=list(words))
 
 
@@ -156,7 +160,7 @@ def _hydra_composed(
         if not folder.is_dir():
             raise ConfigError(f"--config-dir {config_dir} is not a folder")
         searched.append(f"hydra.searchpath=[file://{folder}]")
-    with _hydra():
+    with HydraState():
         try:
             return hydra_compose(config_name=config_name, overrides=searched)
         except (HydraException, OmegaConfBaseException, ValueError) as error:
@@ -205,10 +209,20 @@ def _swept(override: Any, config_dir: str | Path | None) -> list[str]:
         if not names:
             raise ConfigError(f"{line} matches no option; there is {', '.join(known)}")
         return names
+    return [
+        str(value) for value in _sweep_values(override, override.sweep_string_iterator)
+    ]
+
+
+def _sweep_values(
+    override: Any, values: Callable[[], Iterable[Any]], most: int | None = None
+) -> list[Any]:
+    """Values of a choice or a range, at most so many; ConfigError for one without values."""
     try:
-        return list(override.sweep_string_iterator())
+        return list(itertools.islice(values(), most))
     except (HydraException, ValueError, TypeError) as error:
-        raise ConfigError(f"{line}: {_first_line(error)}; give values A,B,C") from None
+        text = f"{override.input_line}: {first_line(error)}"
+        raise ConfigError(f"{text}; give values A,B,C") from None
 
 
 def job_folders(jobs: Sequence[Sequence[str]]) -> list[str]:
@@ -256,7 +270,8 @@ def _several_values(
     if isinstance(value, Glob):
         values = _swept(override, None)
     else:
-        values = [_plain(item) for item in override.sweep_iterator()]
+        items = _sweep_values(override, override.sweep_iterator, MOST_ADVISED + 1)
+        values = [_plain(item) for item in items]
     primary, default = _default(key, overrides)
     return several_values_text(key, line, values, default, primary)
 
@@ -311,53 +326,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list):
         return [_plain(item) for item in value]
     return str(value) if isinstance(value, QuotedString) else value
-
-
-def options(group: str) -> list[str]:
-    """Names that a group offers in the package, sorted."""
-    with _hydra() as hydra:
-        return sorted(hydra.config_loader().get_group_options(group))
-
-
-class _hydra:
-    """Hydra's global state, set up for one call and always left clean."""
-
-    def __enter__(self) -> GlobalHydra:
-        GlobalHydra.instance().clear()
-        self._context = initialize_config_module(CONFIG_MODULE, version_base="1.3")
-        self._context.__enter__()
-        return GlobalHydra.instance()
-
-    def __exit__(self, *details: Any) -> None:
-        self._context.__exit__(*details)
-        GlobalHydra.instance().clear()
-
-
-def parse(overrides: Sequence[str]) -> list[Any]:
-    """Hydra's reading of overrides.
-
-    Raises
-    ------
-    ConfigError    for a word that is no override; says which to quote
-    """
-    for word in overrides:
-        if not isinstance(word, str):
-            raise ConfigError(
-                f"an override is a text such as 'seed=1', not {word!r}; give each as its "
-                "own argument"
-            )
-    if advice := unquoted(overrides):
-        raise ConfigError(advice)
-    for word in overrides:
-        if "=" not in word and not word.startswith("~"):
-            text = (
-                "is neither group=option nor key=value, such as fault=crack or seed=1"
-            )
-            raise ConfigError(f"cannot read the override: '{word}' {text}")
-    try:
-        return list(OverridesParser.create().parse_overrides(overrides=list(overrides)))
-    except HydraException as error:
-        raise ConfigError(f"cannot read the override: {_first_line(error)}") from None
 
 
 def _explain(
@@ -451,13 +419,6 @@ def _known_keys(failure: _Failure) -> list[str]:
     return list(dotted_keys(OmegaConf.to_container(config, resolve=False)))
 
 
-@functools.cache
-def group_names() -> frozenset[str]:
-    """Names of all groups of the package."""
-    with _hydra() as hydra:
-        return frozenset(hydra.config_loader().list_groups(""))
-
-
 def dotted_keys(tree: Any, prefix: str = "") -> list[str]:
     """Keys of nested dictionaries, groups included."""
     if not isinstance(tree, dict):
@@ -479,7 +440,3 @@ def nearest_key(key: str, names: Sequence[str]) -> str:
     if not close:
         return ""
     return f"; did you mean {' or '.join(repr(name) for name in close)}?"
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).strip().splitlines()[0]

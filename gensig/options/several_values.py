@@ -11,6 +11,7 @@ from gensig.units import split_unit
 
 FAULT, TRAIN = "fault", "train"
 FAULT_KEY = f"{FAULT}."
+MOST_ADVISED = 40  # values that fit into a line
 MULTIRUN = {
     "generate": "gensig generate -m makes one data set for each",
     TRAIN: "diagnose train -m makes one run for each",
@@ -42,6 +43,8 @@ def _instead(
     key: str, line: str, values: Sequence[Any], default: Any, primary: str
 ) -> list[str]:
     """Words to type in place of several values."""
+    if len(values) > MOST_ADVISED:
+        return []
     typed = line.partition("=")[2]
     is_decimal = re.fullmatch(r"[-+]?\d+,\d+", typed) is not None
     listed = ",".join(map(str, values))

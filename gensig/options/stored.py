@@ -12,13 +12,8 @@ from omegaconf.errors import OmegaConfBaseException
 
 from gensig.errors import ConfigError
 from gensig.options import files as option_files
-from gensig.options.compose import (
-    composed_groups,
-    dotted_keys,
-    group_names,
-    nearest_key,
-    parse,
-)
+from gensig.options.compose import composed_groups, dotted_keys, nearest_key
+from gensig.options.groups import group_names, parse
 
 INTERPOLATION = "${"
 
@@ -61,9 +56,7 @@ def changed_content(
             changes.append((override.key_or_group, override.value()))
     config = OmegaConf.create(dict(content))
     if chosen:
-        composed = OmegaConf.create(
-            composed_groups(config_name, words, config_dir=config_dir)
-        )
+        composed = composed_groups(config_name, words, config_dir=config_dir)
         _replace_groups(config, composed, chosen, config_dir)
     OmegaConf.set_struct(config, True)
     for key, value in changes:
@@ -89,7 +82,7 @@ def changed_content(
 
 def _replace_groups(
     config: DictConfig,
-    composed: DictConfig,
+    composed: Mapping[str, Any],
     chosen: Mapping[str, str],
     config_dir: str | Path | None,
 ) -> None:
@@ -99,21 +92,21 @@ def _replace_groups(
         options_of |= option_files.chosen_options(group, option, config_dir)
     options_of |= chosen
     for group in options_of:
-        config[group] = _unresolved(composed, group)
+        config[group] = composed.get(group)
     for group, option in options_of.items():
-        if option == "None":
+        if option == str(None):  # a group without an option
             continue
         for key in option_files.option_keys(group, option, config_dir):
             if not key.name.startswith(f"{group}."):
-                value = _unresolved(composed, key.name)
+                value = _at(composed, key.name)
                 OmegaConf.update(config, key.name, value, merge=False)
 
 
-def _unresolved(composed: DictConfig, dotted: str) -> Any:
-    """Value of a dotted key, with its references as text; None where there is none."""
-    node: Any = OmegaConf.to_container(composed, resolve=False)
+def _at(tree: Mapping[str, Any], dotted: str) -> Any:
+    """Value of a dotted key in nested dictionaries; None where there is none."""
+    node: Any = tree
     for name in dotted.split("."):
-        node = node.get(name) if isinstance(node, dict) else None
+        node = node.get(name) if isinstance(node, Mapping) else None
     return node
 
 

@@ -13,8 +13,8 @@ from typing import Any
 from gensig.errors import ConfigError
 from gensig.faults.registry import COMPOUND, FAULTS, fault_parts
 from gensig.life.life_options import RUN_TO_FAILURE
-from gensig.options.compose import options
 from gensig.options.configuration import Configuration
+from gensig.options.groups import options
 from gensig.options.own_options import with_own_options
 from gensig.plan.condition_courses import settle_courses
 from gensig.plan.sources import OptionFiles, Source, StoredConfiguration, read_stored

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
-from gensig.options.compose import options
 from gensig.options.files import USER_FOLDER
+from gensig.options.groups import options
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 from gensig.text.option_writing import is_option_name

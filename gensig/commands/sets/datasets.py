@@ -181,10 +181,10 @@ def _asked(
     recorded = []
     if isinstance(content, list):
         recorded = [str(word) for word in content]
-    if recorded and recorded[0].startswith(STORED_FLAG):
-        return read_request(words, config_dir=config_dir, stored=out).config
     kept = [word for word in recorded if not _is_free(word) and _key(word) not in keys]
     try:
+        if recorded and recorded[0].startswith(STORED_FLAG):
+            return read_request(words, config_dir=config_dir, stored=out).config
         return read_request([*kept, *words], config_dir=config_dir).config
     except ConfigError as error:
         if config_dir is not None:

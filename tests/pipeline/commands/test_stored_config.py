@@ -82,6 +82,8 @@ def test_an_interrupted_set_of_a_stored_configuration_goes_on(
     (first / "config.yaml").unlink()  # what was begun does not need it
     run(2, "resume", "--quiet", "again", "-j", "1", "seed=5")
     assert "another seed" in capsys.readouterr().err
+    run(2, "resume", "--quiet", "again", "-j", "1", "experiment=quickstart")
+    assert "leave out experiment=quickstart" in capsys.readouterr().err
     run(0, "resume", "--quiet", "again", "-j", "1", "seed=0")
     assert contents(tmp_path / "again") == contents(first)
 

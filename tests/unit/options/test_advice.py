@@ -90,6 +90,14 @@ def test_what_is_one_for_a_data_set_is_not_to_be_drawn(word, absent):
     assert "gensig generate -m makes one data set for each" in text
 
 
+def test_many_values_are_not_listed_and_none_are_refused():
+    text, advice = advised(["operating.torque_nm=range(1,1000000000)"])
+    assert advice == []
+    assert len(text) < 200
+    with refused("seed=range(1,3,0): range() arg 3 must not be zero"):
+        override_keys(["seed=range(1,3,0)"])
+
+
 def test_keys_of_a_training_are_told_of_its_own_command():
     for word in ("epochs=3,4", "learning_rate=0.1,0.2", "model=cnn,wdcnn"):
         text, advice = advised([word])

@@ -7,13 +7,17 @@ import pytest
 from docs_pages import ROOT
 from refusals import refused
 
+import diagnose.cli
 from gensig.cli import main
 from gensig.options.compose import sweep
 from gensig.options.files import user_folder
 from gensig.options.own_options import OwnOptionsWarning
 from gensig.plan.request import read_request
 
-NOTE = "gensig: note: ./configs is read for options of your own"
+NOTE = (
+    "gensig: note: ./configs is read for options of your own; "
+    "--config-dir DIR names another folder"
+)
 
 
 @pytest.fixture
@@ -86,6 +90,18 @@ def test_each_command_announces_the_folder_once(own, capsys):
     listed = capsys.readouterr()
     assert "gear=mine" in listed.out
     assert listed.err.count(NOTE) == 1
+
+
+def test_a_training_finds_a_model_of_ones_own(own, tmp_path, capsys):
+    (own / "model").mkdir()
+    (own / "model" / "my_net.yaml").write_text("# Ours.\ndefaults: [cnn, _self_]\n")
+    words = ["train", "model=my_net", f"data={tmp_path / 'none'}", "out=x"]
+    assert diagnose.cli.main(words) == 2
+    note, mistake = capsys.readouterr().err.splitlines()
+    assert note == NOTE.replace("gensig", "diagnose", 1)
+    assert "none does not exist" in mistake
+    assert diagnose.cli.main([*words, "model=my_nett"]) == 2
+    assert "did you mean 'my_net'?" in capsys.readouterr().err
 
 
 def test_a_checkout_is_no_folder_of_ones_own(own, tmp_path, monkeypatch):

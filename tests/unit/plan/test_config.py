@@ -10,7 +10,8 @@ from fault_cases import option
 from gensig.errors import ConfigError, GensigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import read_faults
-from gensig.options.compose import _composed, compose, options, override_keys, sweep
+from gensig.options.compose import _composed, compose, override_keys, sweep
+from gensig.options.groups import options
 from gensig.plan.request import DerivedValueWarning, read_request
 from gensig.systems.pair_machine import severity
 from gensig.systems.registry import read_system

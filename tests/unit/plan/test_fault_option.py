@@ -2,7 +2,8 @@
 
 import pytest
 
-from gensig.options.compose import compose, options
+from gensig.options.compose import compose
+from gensig.options.groups import options
 from gensig.plan.request import read_request
 from gensig.plan.sources import OptionFiles
 from gensig.plan.words import typed_words
