@@ -15,7 +15,7 @@ from gensig.faults.registry import read_faults
 from gensig.geometry import tooth
 from gensig.mesh import body_coupling, pair_table
 from gensig.mesh.load_distribution import loaded_pair_table, sound_load
-from gensig.options.compose import options
+from gensig.options.groups import options
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_system
 

@@ -63,7 +63,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if argv is None:
         argv = sys.argv[1:]
     words = list(argv)
-    return guarded(PROGRAM, lambda: _dispatch(words), interrupted="interrupted")
+    return guarded(PROGRAM, lambda: _dispatch(words))
 
 
 def _dispatch(words: list[str]) -> int:

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 
 from gensig.commands.flags import OVERRIDES_HELP
-from gensig.commands.verbs import VERBS
+from gensig.commands.verbs import GROUPS, VERBS
 from gensig.terminal.program import HELP_FLAGS, Parser, exit_text, guarded, refuse_verb
 from gensig.version import __version__
 
@@ -31,10 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         }
         answer(PROGRAM, verbs, primary="generate")
     words = list(sys.argv[1:] if argv is None else argv)
-    interrupted = (
-        "interrupted; a data set begun is incomplete, and gensig resume DIR finishes it"
-    )
-    return guarded(PROGRAM, lambda: _run(words), interrupted=interrupted)
+    return guarded(PROGRAM, lambda: _run(words))
 
 
 def _run(words: list[str]) -> int:
@@ -61,9 +58,10 @@ def _run_verb(name: str, words: list[str]) -> int:
         arguments = verb_parser(name).parse_intermixed_args(words)
     except SystemExit as leaving:
         return int(leaving.code or 0)
-    from gensig.commands.console import one_line_warnings, step
+    from gensig.commands.console import step
     from gensig.compilation import on_compilation
     from gensig.terminal.run_progress import COMPILING
+    from gensig.terminal.warning_lines import one_line_warnings
 
     module, function = verb.runs.split(":")
     with one_line_warnings(PROGRAM), on_compilation(lambda: step(COMPILING)):
@@ -96,13 +94,15 @@ def _help() -> str:
     statuses = exit_text(
         {1: "partial, damaged or other results: each COMMAND --help says which"}
     )
-    verbs = "\n".join(
-        f"  {name:<{width}}  {verb.summary}" for name, verb in VERBS.items()
-    )
+    groups = []
+    for group, names in GROUPS.items():
+        lines = [f"  {name:<{width}}  {VERBS[name].summary}" for name in names]
+        groups.append("\n".join([f"{group}:", *lines]))
+    verbs = "\n\n".join(groups)
     return (
         "usage: gensig COMMAND [ARGUMENTS]\n\n"
         "Labelled gear-fault vibration data sets from physics.\n\n"
-        f"commands:\n{verbs}\n\n"
+        f"{verbs}\n\n"
         f"{OVERRIDES_HELP}\n"
         "gensig options lists the groups, their options and their keys.\n"
         f"gensig COMMAND --help explains each, with an example.\n\n{statuses}"

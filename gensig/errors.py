@@ -39,5 +39,9 @@ class StepError(SimulationError):
     """A simulation whose steps were too long; with shorter ones it may be run."""
 
 
+class Interrupted(KeyboardInterrupt):
+    """An interruption with the line that says how to go on."""
+
+
 class DatasetError(GensigError):
     """A folder or file that is no data set, is damaged, or would be overwritten."""

@@ -59,8 +59,8 @@ def test_import_is_light(statement: str, absent: tuple[str, ...]) -> None:
 GENSIG = {
     "cli": "commands compilation terminal version",
     "commands": "dataset driveline dynamics errors execution faults geometry life mesh "
-    "operation options papers plan production record report signals systems terminal "
-    "text twin units",
+    "operation options papers plan production record report signals systems terminal text "
+    "twin units",
     "dataset": "errors signals version",
     "driveline": (
         "dynamics errors faults geometry life material mesh operation options sensing "
@@ -82,7 +82,7 @@ GENSIG = {
     ),
     "production": (
         "compilation dataset dynamics errors execution faults life options plan record "
-        "sensing systems terminal units version"
+        "sensing systems terminal text units version"
     ),
     "record": (
         "dataset driveline dynamics errors faults geometry life operation options sensing "

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from diagnose.commands.parser import add_overrides
 from gensig.errors import ConfigError
+from gensig.terminal.warning_lines import one_line_warnings
 
 HELP = """\
 Which test shows the fault? Maps over speed, torque, channel and bandwidth, without any training.
@@ -38,7 +39,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of the verb."""
     add_overrides(parser, "OVERRIDES")
     parser.add_argument(
-        "--config-dir", metavar="DIR", help="folder with groups and options of your own"
+        "--config-dir",
+        metavar="DIR",
+        help="folder with groups and options of your own (default: ./configs, if there)",
     )
     shares = "of the driving pinion (default: shares of the set-point,"
     parser.add_argument(
@@ -101,7 +104,8 @@ def run(arguments: Namespace) -> int:
         fixed_noise=arguments.fixed_noise,
         config_dir=arguments.config_dir,
     )
-    pairs = make_pairs()
+    with one_line_warnings("diagnose"):
+        pairs = make_pairs()
     edges = read_bandwidths(bandwidths, pairs)
     with progress(pairs.n_cells, "simulating") as on_done:
         n_workers = arguments.workers or n_cores()

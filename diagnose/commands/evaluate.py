@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import difflib
+import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
-from diagnose.commands.parser import add_overrides, refuse_existing
+from diagnose.commands.parser import add_model, add_overrides, refuse_existing
 from gensig.errors import ConfigError
 
 HELP = """\
 Evaluate a trained network on a data set.
 
   data=DIR         data set made by gensig generate
-  model_dir=DIR    optional: one of the folders that diagnose train wrote below models/; default the
-                   network for any pair of gears that comes with gensig
   out=DIR          optional: receives metrics.json and confusion.png, of remaining lives also
                    predictions.csv; must not exist or be empty
   protocol=NAME    optional: judge on a part of this split of the data set
@@ -27,20 +26,23 @@ records elsewhere."""
 EXAMPLE = """\
 examples:
   diagnose evaluate data=runs/other
-  diagnose evaluate data=runs/lives2 model_dir=runs/hours/models/by_unit-cnn-seed0
-  diagnose evaluate data=runs/other model_dir=report/models/new_machine-seed0
-  diagnose evaluate data=runs/other model_dir=report/models/new_machine-seed0 channels=wheel_x"""
-KEYS = ("data", "model_dir", "out", "protocol", "subset", "channels")
+  diagnose evaluate --model runs/hours/models/by_unit-cnn-seed0 data=runs/lives2
+  diagnose evaluate --model report/models/new_machine-seed0 data=runs/other
+  diagnose evaluate --model report/models/new_machine-seed0 data=runs/other channels=wheel_x"""
+KEYS = ("data", "out", "protocol", "subset", "channels")
+FORMER = "model_dir"  # spelling of --model until version 0.13
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of the verb."""
     add_overrides(parser)
+    add_model(parser, required=False)
 
 
 def run(arguments: Namespace) -> int:
     """Judge a trained network and print its scores."""
     values = _key_values(arguments.overrides)
+    model = _model(arguments.model, values.pop(FORMER, None))
     out = values.get("out")
     if out is not None:
         refuse_existing(Path(out))
@@ -51,7 +53,7 @@ def run(arguments: Namespace) -> int:
     channels = None
     if "channels" in values:
         channels = values["channels"].strip("[]").split(",")
-    network = open_network(values.get("model_dir", shipped_network()))
+    network = open_network(model or shipped_network())
     evaluation = evaluate_network(
         network,
         open_dataset(values["data"]),
@@ -66,6 +68,17 @@ def run(arguments: Namespace) -> int:
     return 0
 
 
+def _model(given: str | None, former: str | None) -> str | None:
+    """Folder of the network, which may be given by the former key too; None for the shipped one."""
+    if former is None:
+        return given
+    if given is not None:
+        raise ConfigError(f"--model and {FORMER} are both given; leave {FORMER} out")
+    text = f"{FORMER}=DIR is the former spelling of --model DIR"
+    print(f"diagnose: note: {text}", file=sys.stderr)
+    return former
+
+
 def _key_values(words: Sequence[str]) -> dict[str, str]:
     """Words of the form key=value as a dictionary.
 
@@ -76,8 +89,10 @@ def _key_values(words: Sequence[str]) -> dict[str, str]:
         key, equals, value = word.partition("=")
         if not equals or not value:
             raise ConfigError(f"'{word}' is not of the form key=value")
-        if key not in KEYS:
+        if key not in (*KEYS, FORMER):
             hint = f"there is {', '.join(KEYS)}"
+            if key.startswith("model"):
+                hint = "a model is given as --model DIR"
             for close in difflib.get_close_matches(key, KEYS, n=1):
                 hint = f"did you mean {close}?"
             raise ConfigError(f"unknown key '{key}'; {hint}")

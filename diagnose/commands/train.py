@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from diagnose.commands.parser import add_overrides, refuse_existing
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
+from gensig.terminal.warning_lines import one_line_warnings
 
 if TYPE_CHECKING:
     from diagnose.data.windows import Task
@@ -50,18 +51,18 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--config-dir",
         metavar="DIR",
-        help="folder with groups and options of your own",
+        help="folder with groups and options of your own (default: ./configs, if there)",
     )
 
 
 def run(arguments: Namespace) -> int:
     """Train, judge and write the report of every combination."""
-    from gensig.options.compose import compose, override_keys
+    from gensig.options.compose import override_keys
 
     overrides, config_dir = arguments.overrides, arguments.config_dir
     if not arguments.multirun:
         override_keys(overrides)
-        _train_one(compose("train", overrides, config_dir=config_dir))
+        _train_one(_composed(overrides, config_dir))
         return 0
     jobs = _expand(overrides, config_dir)
     for number, config in enumerate(jobs, start=1):
@@ -74,15 +75,27 @@ def _note(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
+def _composed(overrides: Sequence[str], config_dir: str | None) -> Configuration:
+    """Configuration of one training; options of one's own may be in ./configs."""
+    from gensig.options.compose import compose
+    from gensig.options.own_options import with_own_options
+
+    def read(folder: str | Path | None) -> Configuration:
+        return compose("train", overrides, config_dir=folder)
+
+    with one_line_warnings("diagnose"):
+        return with_own_options(read, config_dir)
+
+
 def _expand(overrides: Sequence[str], config_dir: str | None) -> list[Configuration]:
     """Configurations of a multirun, each with its own ``out``.
 
     All composed before the first one runs.
     """
-    from gensig.options.compose import compose, job_folders, sweep
+    from gensig.options.compose import job_folders, sweep
 
-    jobs = sweep(overrides)
-    configs = [compose("train", job, config_dir=config_dir) for job in jobs]
+    jobs = sweep(overrides, config_dir=config_dir)
+    configs = [_composed(job, config_dir) for job in jobs]
     parents = {str(config["out"]) for config in configs}
     if len(parents) > 1:
         raise ConfigError(

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 MODEL_SCHEMA_VERSION = 2
 # Version 1 is without out_of_distribution and speed_rpm_range.
 READABLE_VERSIONS = (1, MODEL_SCHEMA_VERSION)
+SHOWN_MODELS = 12  # in an error message
 WEIGHTS, DESCRIPTION = "model.safetensors", "model.json"
 
 
@@ -309,16 +310,26 @@ def read_description(folder: str | Path) -> ModelDescription:
             )
         return ModelDescription(**_typed(content))
     except FileNotFoundError:
-        models = folder / "models"
-        inside = sorted(file.parent for file in models.glob(f"*/{DESCRIPTION}"))
-        hint = ""
-        if inside:
-            hint = f"; choose one of its models, for instance {inside[0]}"
-        raise DatasetError(f"{folder} holds no {DESCRIPTION}{hint}") from None
+        raise DatasetError(_no_model(folder)) from None
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DatasetError(
             f"{path} does not describe a model: {one_line(error)}"
         ) from None
+
+
+def _no_model(folder: Path) -> str:
+    """Message for a folder without a model, with the models below it."""
+    if not folder.exists():
+        return f"{folder} does not exist; give a folder that diagnose train wrote below models/"
+    below = [*folder.glob(f"*/{DESCRIPTION}"), *folder.glob(f"models/*/{DESCRIPTION}")]
+    models = sorted(str(file.parent) for file in below)
+    text = f"{folder} holds no {DESCRIPTION}"
+    if not models:
+        return text
+    listed = ", ".join(models[:SHOWN_MODELS])
+    if len(models) > SHOWN_MODELS:
+        listed += f" and {len(models) - SHOWN_MODELS} more"
+    return f"{text}; choose one of its models: {listed}"
 
 
 def _typed(content: Mapping[str, Any]) -> dict[str, Any]:

@@ -93,12 +93,34 @@ def overrides(help: str) -> Argument:
     return text("overrides", "OVERRIDES", help, nargs="*")
 
 
-CONFIG_DIR = text("--config-dir", "DIR", "folder with groups and options of your own")
+CONFIG_DIR = text(
+    "--config-dir",
+    "DIR",
+    "folder with groups and options of your own (default: ./configs, if there)",
+)
 CONFIGURATION = (overrides(OVERRIDES_HELP), CONFIG_DIR)
 FOLDER = text("folder", "DIR", "folder of a data set")
 PLOT = text("--plot", "FILE", "write a figure (PNG, SVG or PDF)")
 REPLACE_OUT = switch("--force", help="replace the file of --out")
 SEARCH_SEED = count("--seed", "N", "of the search (default: 0)", default=0)
+MULTIRUN = switch(
+    "-m", "--multirun", help="one data set for each combination of values a,b"
+)
+# flags for keys that people look for among the flags
+OUT = text("--out", "DIR", "the same as out=DIR", dest="out_flag")
+STORED = text(
+    "--config",
+    "FILE",
+    "configuration of a data set, its config.yaml, in place of the options; OVERRIDES change it",
+)
+WORKERS = Argument(
+    ("-j", "--workers"),
+    {
+        "metavar": "N",
+        "type": int,
+        "help": "worker processes (default: one a core); as executor.n_workers=N",
+    },
+)
 QUIET = switch("--quiet", help="print nothing but mistakes")
 
 

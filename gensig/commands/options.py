@@ -8,10 +8,10 @@ import sys
 from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from gensig.errors import ConfigError
-from gensig.options import files as option_files
 from gensig.options.files import (
     PRIMARY,
     Key,
@@ -21,7 +21,9 @@ from gensig.options.files import (
     options,
     section_keys,
     sections,
+    user_folder,
 )
+from gensig.options.own_options import say_read
 from gensig.text import nearest
 
 VALUE_WIDTH = 34  # longer values are cut; --json has them whole
@@ -33,7 +35,10 @@ Listing = tuple[Any, list[str]]  # content for --json, and the lines of text
 
 def list_options(arguments: Namespace) -> int:
     """Print the groups, the options of one group, or the keys of one option."""
-    content, lines = _listing(arguments.what, arguments.config_dir)
+    folder = arguments.config_dir
+    if folder is None and (folder := user_folder()) is not None:
+        say_read()
+    content, lines = _listing(arguments.what, folder)
     if arguments.json:
         print(json.dumps(content, indent=1))
     else:
@@ -41,7 +46,7 @@ def list_options(arguments: Namespace) -> int:
     return 0
 
 
-def _listing(word: str | None, folder: str | None) -> Listing:
+def _listing(word: str | None, folder: str | Path | None) -> Listing:
     if word is None:
         return _all_groups(folder)
     group, equals, option = word.partition("=")
@@ -54,7 +59,7 @@ def _listing(word: str | None, folder: str | None) -> Listing:
     return _group_listing(group, folder)
 
 
-def _all_groups(folder: str | None) -> Listing:
+def _all_groups(folder: str | Path | None) -> Listing:
     result, parts = groups(folder), sections()
     contents = []
     for group in result:
@@ -74,7 +79,7 @@ def _all_groups(folder: str | None) -> Listing:
     return {"groups": contents, "sections": list(parts)}, lines
 
 
-def _group_listing(group: str, folder: str | None) -> Listing:
+def _group_listing(group: str, folder: str | Path | None) -> Listing:
     default = _defaults(group, folder)[group]
     rows, contents = [], []
     for option in options(group, folder):
@@ -90,11 +95,11 @@ def _group_listing(group: str, folder: str | None) -> Listing:
     return {"group": group, "options": contents}, lines
 
 
-def _option_listing(group: str, option: str, folder: str | None) -> Listing:
+def _option_listing(group: str, option: str, folder: str | Path | None) -> Listing:
     _defaults(group, folder)
     abouts = {result.name: result.about for result in options(group, folder)}
     if option not in abouts:
-        hint = option_files.elsewhere(group, option) or nearest.hint(option, abouts)
+        hint = nearest.hint(option, abouts)
         raise ConfigError(f"no option '{option}' of {group}; {hint}")
     keys = option_keys(group, option, folder)
     chosen = chosen_options(group, option, folder)
@@ -113,7 +118,7 @@ def _option_listing(group: str, option: str, folder: str | None) -> Listing:
     return content, [*lines, "", *_key_table(keys)]
 
 
-def _defaults(group: str, folder: str | None) -> dict[str, Any]:
+def _defaults(group: str, folder: str | Path | None) -> dict[str, Any]:
     """Group -> default option; raises ConfigError where ``group`` is no group."""
     defaults = {result.name: result.default for result in groups(folder)}
     if group in defaults:

@@ -6,8 +6,9 @@ import textwrap
 from argparse import Namespace
 from pathlib import Path
 
-from gensig.commands.console import one_line_warnings, replaced_file
+from gensig.commands.console import replaced_file
 from gensig.errors import ConfigError
+from gensig.terminal.warning_lines import one_line_warnings
 
 WIDTH = 90  # letters of a line of a reason
 

@@ -6,7 +6,11 @@ from gensig.commands.flags import (
     CONFIG_DIR,
     CONFIGURATION,
     FOLDER,
+    MULTIRUN,
+    OUT,
     QUIET,
+    STORED,
+    WORKERS,
     Argument,
     Verb,
     count,
@@ -138,15 +142,15 @@ SET_VERBS = {
         examples=(
             "gensig generate experiment=quickstart out=runs/quickstart",
             "gensig generate -m fault=healthy,crack plan.n_records=20 out=runs/two",
+            "gensig generate --config runs/quickstart/config.yaml seed=2 out=runs/other",
         ),
         runs="gensig.commands.sets.datasets:generate",
         arguments=(
             *CONFIGURATION,
-            switch(
-                "-m",
-                "--multirun",
-                help="one data set for each combination of values a,b",
-            ),
+            STORED,
+            MULTIRUN,
+            OUT,
+            WORKERS,
             QUIET,
         ),
         status_1=INCOMPLETE,
@@ -156,14 +160,24 @@ SET_VERBS = {
         examples=(
             "gensig plan experiment=quickstart plan.n_records=2000",
             "gensig plan experiment=quickstart out=runs/large --freeze",
+            "gensig plan experiment=quickstart fault=crack --show-config",
         ),
         runs="gensig.commands.sets.datasets:plan",
         arguments=(
             *CONFIGURATION,
+            STORED,
+            MULTIRUN,
+            OUT,
+            WORKERS,
             switch(
                 "--freeze",
                 help="make the folder out=DIR, ready for resume or array jobs",
             ),
+            switch(
+                "--show-config",
+                help="print the configuration as YAML, and nothing else",
+            ),
+            Argument(("--cfg",), {"choices": ("job",), "help": "as --show-config"}),
         ),
     ),
     "new": Verb(
@@ -186,7 +200,7 @@ SET_VERBS = {
         arguments=(
             FOLDER,
             overrides("executor=... and executor.key=...; other keys must agree"),
-            count("--workers", "N", "worker processes (default: one a core)"),
+            WORKERS,
             QUIET,
         ),
         status_1=INCOMPLETE,

@@ -39,6 +39,11 @@ class Distribution(ABC):
     def least(self) -> float:
         """Smallest value."""
 
+    @property
+    @abstractmethod
+    def text(self) -> str:
+        """The range in words, such as '1200 to 2400'."""
+
     @abstractmethod
     def values_at(self, unit: Array) -> list[Any]:
         """Values at points of the unit interval, (point,); plain Python numbers."""
@@ -60,6 +65,11 @@ class Range(Distribution):
         """The lower end."""
         return self.low
 
+    @property
+    def text(self) -> str:
+        """Both ends."""
+        return f"{self.low:g} to {self.high:g}"
+
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,6 +89,11 @@ class Uniform(Range):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LogUniform(Range):
     """Equal probability of the logarithm; levels in equal ratios."""
+
+    @property
+    def text(self) -> str:
+        """Both ends."""
+        return f"{self.low:g} to {self.high:g}, logarithmic"
 
     def values_at(self, unit: Array) -> list[Any]:
         """See ``Distribution``."""
@@ -100,6 +115,12 @@ class Normal(Range):
     mean: float
     std: float
 
+    @property
+    def text(self) -> str:
+        """Both ends, mean and standard deviation."""
+        ends = f"{self.low:g} to {self.high:g}"
+        return f"{ends}, normal around {self.mean:g} by {self.std:g}"
+
     def values_at(self, unit: Array) -> list[Any]:
         """See ``Distribution``."""
         from scipy.stats import truncnorm
@@ -116,6 +137,11 @@ class Normal(Range):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Integers(Range):
     """Whole numbers of equal probability; levels are those nearest to equal steps."""
+
+    @property
+    def text(self) -> str:
+        """Both ends."""
+        return f"{self.low:g} to {self.high:g}, whole numbers"
 
     def values_at(self, unit: Array) -> list[Any]:
         """See ``Distribution``."""
@@ -143,6 +169,11 @@ class Choice(Distribution):
     def least(self) -> float:
         """The smallest listed value."""
         return min(self.values)
+
+    @property
+    def text(self) -> str:
+        """The listed values."""
+        return ", ".join(f"{value:g}" for value in self.values)
 
     def values_at(self, unit: Array) -> list[Any]:
         """See ``Distribution``."""

@@ -23,7 +23,6 @@ from gensig.dataset.selection import (
     Records,
     Selection,
     StoredRecord,
-    record_number,
     record_numbers,
     structured,
     unknown_name,
@@ -270,11 +269,9 @@ class Dataset:
         """
         if isinstance(records, int | np.integer):
             return self._signal(int(records), start, stop, channels, name)
-        ids = self.plan.columns["record_id"]
         if isinstance(records, str):
-            number = record_number(records, ids, self.folder)
-            return self._signal(number, start, stop, channels, name)
-        numbers = record_numbers(records, ids, self.folder)
+            return self.signals([records], start, stop, channels, name=name)[0]
+        numbers = record_numbers(records, self.plan.columns["record_id"], self.folder)
         n_channels = len(self.channel_names if channels is None else channels)
         last = self.n_samples if stop is None else stop
         block = np.empty((len(numbers), n_channels, max(0, last - start)), np.float32)

@@ -237,10 +237,10 @@ def record_numbers(
         raise DatasetError(
             f"{len(records)} values of True and False for {len(ids)} records: give one a record"
         )
-    return [record_number(record, ids, folder) for record in _chosen(records)]
+    return [_record_number(record, ids, folder) for record in _chosen(records)]
 
 
-def record_number(record: Any, ids: np.ndarray, folder: Path) -> int:
+def _record_number(record: Any, ids: np.ndarray, folder: Path) -> int:
     """Number of one record by its number or id."""
     if isinstance(record, str):
         places = np.flatnonzero(ids == record)

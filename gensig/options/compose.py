@@ -9,17 +9,15 @@ from __future__ import annotations
 import copy
 import difflib
 import functools
+import itertools
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from hydra import compose as hydra_compose
-from hydra import initialize_config_module
-from hydra.core.global_hydra import GlobalHydra
-from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import OverrideType, QuotedString
+from hydra.core.override_parser.types import Glob, OverrideType, QuotedString
 from hydra.errors import HydraException
 from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -27,9 +25,23 @@ from omegaconf.errors import OmegaConfBaseException
 from gensig.errors import ConfigError
 from gensig.options import files as option_files
 from gensig.options.configuration import Configuration
+from gensig.options.groups import (
+    HydraState,
+    first_line,
+    group_names,
+    options,
+    parse,
+)
+from gensig.options.several_values import (
+    MOST_ADVISED,
+    interval_text,
+    list_text,
+    several_values_text,
+)
 from gensig.text import nearest
 
-CONFIG_MODULE = "gensig.configs"
+# names under which faults of rolling bearings are looked for
+BEARING_FAULT = r"(?i)bearing|ball|roller|cage|(inner|outer)_?(race|ring)|bp[fs]|ftf"
 
 
 def compose(
@@ -80,12 +92,12 @@ def _set_in_options(config_name: str, words: tuple[str, ...]) -> Configuration:
     ConfigError    for words other than ``group=option`` and ``key=value``; Hydra's errors
     """
     chosen, changes = [], []
-    for word, override in zip(words, _parse(words), strict=True):
+    for word, override in zip(words, parse(words), strict=True):
         is_change = override.type is OverrideType.CHANGE and override.package is None
         if not is_change or override.is_sweep_override():
             raise ConfigError(f"'{word}' is not only a change of a value")
         key, value = override.key_or_group, override.value()
-        is_group = key in _group_names() or "/" in key
+        is_group = key in group_names() or "/" in key
         if is_group and isinstance(value, dict):
             raise ConfigError(f"'{word}' changes values of a group")
         if is_group:
@@ -101,7 +113,7 @@ def _set_in_options(config_name: str, words: tuple[str, ...]) -> Configuration:
 @functools.lru_cache(maxsize=64)
 def _chosen_options(config_name: str, words: tuple[str, ...]) -> DictConfig:
     """Composition of the package's options, interpolations unresolved; not to be changed."""
-    with _hydra():
+    with HydraState():
         return hydra_compose(config_name=config_name, overrides=list(words))
 
 
@@ -111,36 +123,106 @@ def _resolved(config: DictConfig) -> Configuration:
     return Configuration({str(key): value for key, value in values.items()})
 
 
+def composed_groups(
+    config_name: str, words: Sequence[str], *, config_dir: str | Path | None
+) -> dict[str, Any]:
+    """A composition as plain nested dictionaries whose references are not resolved yet.
+
+    Raises
+    ------
+    ConfigError    for an unknown group or option
+    """
+    content = OmegaConf.to_container(
+        _hydra_composed(config_name, tuple(words), config_dir), resolve=False
+    )
+    assert isinstance(content, dict)
+    return {str(key): value for key, value in content.items()}
+
+
 def _composed(
     config_name: str, words: tuple[str, ...], config_dir: str | Path | None
 ) -> Configuration:
+    config = _hydra_composed(config_name, words, config_dir)
+    try:
+        return _resolved(config)
+    except (OmegaConfBaseException, ValueError) as error:
+        text = _explain(error, config_name, words, config_dir)
+        raise ConfigError(text) from None
+
+
+def _hydra_composed(
+    config_name: str, words: tuple[str, ...], config_dir: str | Path | None
+) -> DictConfig:
+    """A composition whose references are not resolved yet."""
     searched = list(words)
     if config_dir is not None:
         folder = Path(config_dir).expanduser().resolve()
         if not folder.is_dir():
             raise ConfigError(f"--config-dir {config_dir} is not a folder")
         searched.append(f"hydra.searchpath=[file://{folder}]")
-    with _hydra():
+    with HydraState():
         try:
-            return _resolved(hydra_compose(config_name=config_name, overrides=searched))
+            return hydra_compose(config_name=config_name, overrides=searched)
         except (HydraException, OmegaConfBaseException, ValueError) as error:
             text = _explain(error, config_name, words, config_dir)
             raise ConfigError(text) from None
 
 
-def sweep(overrides: Sequence[str]) -> list[list[str]]:
-    """Expand comma and range sweeps into one list of overrides a job (the Cartesian product,
-    first key slowest).
+def sweep(
+    overrides: Sequence[str], *, config_dir: str | Path | None = None
+) -> list[list[str]]:
+    """Expand sweeps into one list of overrides a job.
+
+    The jobs are the Cartesian product of the values, the first key slowest. ``glob(...)`` stands
+    for the options of a group whose names match, those of ``config_dir`` or ./configs included.
+
+    Raises
+    ------
+    ConfigError    for a sweep without end, one that matches nothing, or one that Hydra refuses
     """
     jobs: list[list[str]] = [[]]
-    for override in _parse(overrides):
+    for override in parse(overrides):
         key = override.get_key_element()
         if override.is_sweep_override():
-            values = [f"{key}={value}" for value in override.sweep_string_iterator()]
+            values = [f"{key}={text}" for text in _swept(override, config_dir)]
         else:
             values = [override.input_line or key]
         jobs = [[*job, value] for job in jobs for value in values]
     return jobs
+
+
+def _swept(override: Any, config_dir: str | Path | None) -> list[str]:
+    """Values of a sweep as they are typed."""
+    key, line, value = str(override.key_or_group), override.input_line, override.value()
+    if override.is_interval_sweep():
+        primary = _default(key, [])[0]
+        text = interval_text(key, line, value.start, value.end, primary)
+        raise ConfigError(text)
+    if isinstance(value, Glob):
+        folder = config_dir or option_files.user_folder()
+        known = [option.name for option in option_files.options(key, folder)]
+        names = value.filter(known)
+        if not known:
+            raise ConfigError(
+                f"{line}: glob(...) stands for options of a group; '{key}' is none"
+            )
+        if not names:
+            raise ConfigError(f"{line} matches no option; there is {', '.join(known)}")
+        return names
+    return [
+        str(value) for value in _sweep_values(override, override.sweep_string_iterator)
+    ]
+
+
+def _sweep_values(
+    override: Any, values: Callable[[], Iterable[Any]], most: int | None = None
+) -> list[Any]:
+    """Values of a choice or a range, at most so many; ConfigError for one without values."""
+    try:
+        return list(itertools.islice(values(), most))
+    except (HydraException, ValueError, TypeError) as error:
+        text = f"{override.input_line}: {first_line(error)}"
+        raise ConfigError(f"{text}; give values A,B,C") from None
 
 
 def job_folders(jobs: Sequence[Sequence[str]]) -> list[str]:
@@ -157,39 +239,68 @@ def job_folders(jobs: Sequence[Sequence[str]]) -> list[str]:
 
 
 def override_keys(overrides: Sequence[str]) -> dict[str, str]:
-    """Keys and groups that were typed, each with its value as text; refuses a sweep."""
+    """Keys and groups that were typed, each with its value as text.
+
+    Raises
+    ------
+    ConfigError    for several values of a key that takes one; says what to type instead
+    """
     keys: dict[str, str] = {}
-    for override in _parse(overrides):
+    for override in parse(overrides):
+        key, line = str(override.key_or_group), str(override.input_line)
         if override.is_sweep_override():
-            raise ConfigError(
-                f"{override.input_line}: several values need -m (one data set for "
-                f"each){_list_hint(override)}"
-            )
-        keys[str(override.key_or_group)] = override.get_value_element_as_str()
+            raise ConfigError(_several_values(key, line, override, overrides))
+        value = override.value()
+        if isinstance(value, list):
+            default = _default(key, overrides)[1]
+            if text := list_text(key, line, _plain(value), default):
+                raise ConfigError(text)
+        keys[key] = override.get_value_element_as_str()
     return keys
 
 
-def _list_hint(override: Any) -> str:
-    """A hint where several values were meant as one: a decimal comma, a list without brackets."""
-    key, text = str(override.key_or_group), str(override.input_line).partition("=")[2]
-    parts = [part.strip() for part in text.split(",")]
-    is_decimal = re.fullmatch(r"[-+]?\d+, ?\d+", text) is not None
-    default = _default(key)
-    is_unknown_key = default is None and "." in key
-    if isinstance(default, ListConfig) or (is_unknown_key and not is_decimal):
-        return f"; or is it a list? Then write '{key}=[{','.join(parts)}]'"
-    if is_decimal:
-        return f"; or is it a decimal point? Then write {key}={'.'.join(parts)}"
-    return ""
+def _several_values(
+    key: str, line: str, override: Any, overrides: Sequence[str]
+) -> str:
+    """Advice for a sweep without ``-m``."""
+    value = override.value()
+    if override.is_interval_sweep():
+        primary = _default(key, overrides)[0]
+        return interval_text(key, line, value.start, value.end, primary)
+    if isinstance(value, Glob):
+        values = _swept(override, None)
+    else:
+        items = _sweep_values(override, override.sweep_iterator, MOST_ADVISED + 1)
+        values = [_plain(item) for item in items]
+    primary, default = _default(key, overrides)
+    return several_values_text(key, line, values, default, primary)
 
 
-def _default(key: str) -> Any:
-    """Value of a dotted key in the first default configuration that has one."""
+def _default(key: str, overrides: Sequence[str]) -> tuple[str, Any]:
+    """Primary file of a dotted key, and its value in the packaged options that were chosen.
+
+    A group is an empty mapping, and an unknown key None, of the first primary file.
+    """
+    primaries = {group.name: group.primary for group in option_files.groups()}
+    if key in primaries:
+        return primaries[key], {}
+    heads = {word: word.partition("=")[0] for word in overrides}
+    chosen = [
+        word for word, head in heads.items() if head in group_names() and head != key
+    ]
     for primary in option_files.PRIMARY:
-        value = OmegaConf.select(_chosen_options(primary, ()), key)
-        if value is not None:
-            return value
-    return None
+        for words in (tuple(chosen), ()):
+            try:
+                config = _chosen_options(primary, words)
+                value = OmegaConf.select(config, key)
+            except (HydraException, OmegaConfBaseException, ValueError):
+                continue
+            if isinstance(value, ListConfig):
+                return primary, list(value)
+            known = dotted_keys(OmegaConf.to_container(config, resolve=False))
+            if value is not None or key in known:
+                return primary, value
+    return primaries.get(key.partition(".")[0], option_files.PRIMARY[0]), None
 
 
 def typed_mapping(overrides: Sequence[str], key: str) -> dict[str, Any]:
@@ -198,7 +309,7 @@ def typed_mapping(overrides: Sequence[str], key: str) -> dict[str, Any]:
     Such a mapping may have names that no option has yet.
     """
     result: dict[str, Any] = {}
-    for override in _parse([word for word in overrides if word.startswith(f"{key}=")]):
+    for override in parse([word for word in overrides if word.startswith(f"{key}=")]):
         value = override.value()
         if not isinstance(value, dict):
             raise ConfigError(
@@ -215,44 +326,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list):
         return [_plain(item) for item in value]
     return str(value) if isinstance(value, QuotedString) else value
-
-
-def options(group: str) -> list[str]:
-    """Names that a group offers in the package, sorted."""
-    with _hydra() as hydra:
-        return sorted(hydra.config_loader().get_group_options(group))
-
-
-class _hydra:
-    """Hydra's global state, set up for one call and always left clean."""
-
-    def __enter__(self) -> GlobalHydra:
-        GlobalHydra.instance().clear()
-        self._context = initialize_config_module(CONFIG_MODULE, version_base="1.3")
-        self._context.__enter__()
-        return GlobalHydra.instance()
-
-    def __exit__(self, *details: Any) -> None:
-        self._context.__exit__(*details)
-        GlobalHydra.instance().clear()
-
-
-def _parse(overrides: Sequence[str]) -> list[Any]:
-    for word in overrides:
-        if not isinstance(word, str):
-            raise ConfigError(
-                f"an override is a text such as 'seed=1', not {word!r}; give each as its "
-                "own argument"
-            )
-        if "=" not in word and not word.startswith("~"):
-            text = (
-                "is neither group=option nor key=value, such as fault=crack or seed=1"
-            )
-            raise ConfigError(f"cannot read the override: '{word}' {text}")
-    try:
-        return list(OverridesParser.create().parse_overrides(overrides=list(overrides)))
-    except HydraException as error:
-        raise ConfigError(f"cannot read the override: {_first_line(error)}") from None
 
 
 def _explain(
@@ -279,8 +352,8 @@ def _explain(
 
 def _not_an_option(words: Sequence[str]) -> str | None:
     """Message for the first group that was given a number or a mapping."""
-    groups = _group_names()
-    for override in _parse(words):
+    groups = group_names()
+    for override in parse(words):
         key = str(override.key_or_group)
         if key in groups and not isinstance(override.value(), str | list):
             names = ", ".join(options(key))
@@ -300,14 +373,14 @@ class _Failure:
 
 def _unknown_key(failure: _Failure) -> str:
     keys = _known_keys(failure)
-    return f"unknown key '{failure.name}'{_nearest(failure.name, keys)}"
+    return f"unknown key '{failure.name}'{nearest_key(failure.name, keys)}"
 
 
 def _unknown_group(failure: _Failure) -> str:
     files = {group.name: group.primary for group in option_files.groups()}
     primary = files.get(failure.name)
     if primary is None:
-        return f"unknown group '{failure.name}'{_nearest(failure.name, list(files))}"
+        return f"unknown group '{failure.name}'{nearest_key(failure.name, list(files))}"
     return (
         f"the group '{failure.name}' is one of {primary}.yaml, "
         f"not of {failure.config_name}.yaml"
@@ -317,7 +390,12 @@ def _unknown_group(failure: _Failure) -> str:
 def _unknown_option(failure: _Failure) -> str:
     group, _, wanted = failure.name.rpartition("/")
     names = [option.name for option in option_files.options(group, failure.config_dir)]
-    hint = option_files.elsewhere(group, wanted) or nearest.hint(wanted, names)
+    if group == "fault" and re.match(BEARING_FAULT, wanted):
+        return (
+            f"no option '{wanted}' of fault: faults of bearings are not in this version; "
+            f"there is {', '.join(names)}"
+        )
+    hint = nearest.hint(wanted, names)
     return f"no option '{wanted}' of {group}; {hint}"
 
 
@@ -332,31 +410,26 @@ _EXPLANATIONS: dict[str, Callable[[_Failure], str]] = {
 
 def _known_keys(failure: _Failure) -> list[str]:
     """Dotted keys of the default configuration with the groups that were chosen."""
-    groups = _group_names()
+    groups = group_names()
     words = [word for word in failure.words if word.partition("=")[0] in groups]
     try:
         config = _chosen_options(failure.config_name, tuple(words))
     except HydraException:
         config = _chosen_options(failure.config_name, ())
-    return list(_dotted(OmegaConf.to_container(config, resolve=False)))
+    return list(dotted_keys(OmegaConf.to_container(config, resolve=False)))
 
 
-@functools.cache
-def _group_names() -> frozenset[str]:
-    with _hydra() as hydra:
-        return frozenset(hydra.config_loader().list_groups(""))
-
-
-def _dotted(tree: Any, prefix: str = "") -> list[str]:
+def dotted_keys(tree: Any, prefix: str = "") -> list[str]:
+    """Keys of nested dictionaries, groups included."""
     if not isinstance(tree, dict):
         return []
     keys = []
     for key, value in tree.items():
-        keys += [f"{prefix}{key}", *_dotted(value, f"{prefix}{key}.")]
+        keys += [f"{prefix}{key}", *dotted_keys(value, f"{prefix}{key}.")]
     return keys
 
 
-def _nearest(key: str, names: Sequence[str]) -> str:
+def nearest_key(key: str, names: Sequence[str]) -> str:
     """'; did you mean ...?' over whole keys, then over their last part."""
     close = difflib.get_close_matches(key, names, n=3, cutoff=0.6)
     if not close:
@@ -367,7 +440,3 @@ def _nearest(key: str, names: Sequence[str]) -> str:
     if not close:
         return ""
     return f"; did you mean {' or '.join(repr(name) for name in close)}?"
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).strip().splitlines()[0]

@@ -313,14 +313,18 @@ def _option_keys(
     yield from file.entries("" if file.is_global else f"{package}.")
 
 
-def elsewhere(group: str, option: str) -> str | None:
-    """Hint for an option in the folder where gensig new writes, which was not named."""
-    if not (Path(USER_FOLDER) / group / f"{option}.yaml").is_file():
+def user_folder() -> Path | None:
+    """./configs where it holds options of a user; None where it is gensig's own or another's."""
+    folder = Path(USER_FOLDER)
+    is_checkout = (folder / f"{PRIMARY[0]}.yaml").exists()
+    if not folder.is_dir() or is_checkout or folder.samefile(_folders(None)[0]):
         return None
-    return (
-        f"it is in ./{USER_FOLDER}: add --config-dir {USER_FOLDER}, "
-        f"in Python config_dir='{USER_FOLDER}'"
-    )
+    names = [group.name for group in groups()]
+    if not any(
+        path.is_file() for name in names for path in (folder / name).glob("*.yaml")
+    ):
+        return None
+    return folder
 
 
 def _find(group: str, option: str, config_dir: str | Path | None) -> _File:

@@ -23,20 +23,35 @@ from gensig.life.life_options import runs_to_failure
 from gensig.life.options import read_wear_options
 from gensig.mesh.pair_table import check_teeth
 from gensig.options.configuration import Configuration
-from gensig.plan.draws import draw_class_faults, draw_values, fault_sizes, fault_specs
+from gensig.plan.draws import (
+    draw_class_faults,
+    draw_values,
+    drawn_gears,
+    fault_sizes,
+    fault_specs,
+)
 from gensig.plan.lives import snapshots
 from gensig.plan.unit_designs import UnitDesigns, check_designs, draw_designs
 from gensig.record.gear_columns import gear_columns
 from gensig.record.inputs import MISSING, InputReader, draw_start
 from gensig.record.machines import read_machine
-from gensig.record.options import PlanOptions, read_dataset_options, read_plan_options
+from gensig.record.options import (
+    TORQUE_KEY,
+    PlanOptions,
+    draws_unit_load,
+    read_dataset_options,
+    read_plan_options,
+)
 from gensig.record.simulate import signal_shapes
 from gensig.record.streams import Stream, stream
 from gensig.systems.base import Machine
 from gensig.systems.pair_machine import severity
 from gensig.units import from_si
 
-SHARD_BYTES = 65_536_000  # 80 records of 4 x 51,200 float32 samples
+# Records of a shard where the number is not given: small shards keep a few workers busy to the
+# end, a large set has few files, and every worker builds its shard in memory.
+LEAST_IN_SHARD, MOST_SHARDS, MOST_SHARD_BYTES = 24, 1000, 500_000_000
+LANES = 8  # records that are integrated together; whole groups of them cost least
 MOST_IN_GRID = 1_000_000  # records; a product of levels is soon larger than meant
 COUNT_BYTES = 2  # of a sample stored as an int16 count
 
@@ -320,6 +335,32 @@ def describe_design(config: Configuration) -> str:
     return f"grid of {crossed or 'no key'}" + f"; drawn: {drawn}" * bool(drawn)
 
 
+def varied_keys(config: Configuration) -> dict[str, str]:
+    """Key that a plan varies -> its range in words; keys of faults begin with their class.
+
+    Sizes of faults that are shares of a tooth are those of the configured gear.
+    """
+    varied = {
+        key: distribution.text
+        for key, distribution in read_plan_options(config).vary.items()
+    }
+    if draws_unit_load(config):
+        varied[TORQUE_KEY] += " of unit load, N/mm2"
+    if runs_to_failure(config):
+        grown = "grows along each life"
+        return varied | {
+            name: grown
+            for name, fault in config["classes"].items()
+            if fault_parts(fault)
+        }
+    if gears := drawn_gears(config):
+        sizes = "sizes and teeth below are of the configured gear"
+        varied["fault_gear"] = f"{', '.join(gears)}; {sizes}"
+    for name, vary in _fault_varies(config).items():
+        varied |= {f"{name}.{key}": vary[key].text for key in vary}
+    return varied
+
+
 def _fitting(plan: PlanOptions, n_records: int, counts: tuple[int, ...]) -> int:
     """Number of records that follows from the other counts.
 
@@ -392,7 +433,8 @@ def _as_plan(config: Configuration, rows: list[dict[str, Any]]) -> Plan:
     A parameter that a record has not is NaN. The rows are emptied: nothing is held twice.
     """
     names = dict.fromkeys(itertools.chain(*rows))
-    shard, number = shard_rows(len(rows), records_per_shard(config))
+    together = records_per_shard(config, len(rows))
+    shard, number = shard_rows(len(rows), together)
     columns: dict[str, Any] = {"record_id": record_ids(len(rows))}
     columns |= {"shard": shard, "row": number}
     for name in names:
@@ -400,10 +442,23 @@ def _as_plan(config: Configuration, rows: list[dict[str, Any]]) -> Plan:
     return Plan(columns=columns)
 
 
-def records_per_shard(config: Configuration) -> int:
-    """Number of records as configured, else for about 64 MB of samples."""
+def records_per_shard(config: Configuration, n_records: int) -> int:
+    """Number of records of a shard, as configured or for a set of ``n_records``.
+
+    Where it is not configured, it grows with the set: 24 up to 24,000 records, then as many as
+    make 1,000 shards. The samples of a shard take at most 500 MB.
+    """
     given = read_dataset_options(config).records_per_shard
-    return given or max(1, SHARD_BYTES // record_bytes(config))
+    if given is not None:
+        return given
+    groups = math.ceil(n_records / (MOST_SHARDS * LANES))
+    wanted = max(LEAST_IN_SHARD, groups * LANES)
+    fitting = MOST_SHARD_BYTES // record_bytes(config)
+    if wanted <= fitting:
+        return wanted
+    if fitting < LANES:
+        return max(1, fitting)
+    return fitting // LANES * LANES
 
 
 def record_bytes(config: Configuration, *, as_stored: bool = False) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import difflib
-import functools
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,15 +13,18 @@ from typing import Any
 from gensig.errors import ConfigError
 from gensig.faults.registry import COMPOUND, FAULTS, fault_parts
 from gensig.life.life_options import RUN_TO_FAILURE
-from gensig.options import files as option_files
-from gensig.options.compose import compose, options, override_keys, typed_mapping
 from gensig.options.configuration import Configuration
+from gensig.options.groups import options
+from gensig.options.own_options import with_own_options
 from gensig.plan.condition_courses import settle_courses
+from gensig.plan.sources import OptionFiles, Source, StoredConfiguration, read_stored
+from gensig.plan.words import Words, typed_words
 from gensig.record.options import AS_GIVEN
 from gensig.systems.registry import SIDES
 
-CONFIG_NAME = "generate"
-VARY_KEYS = ("plan.vary", "fault.vary")
+STORED_FLAG = (
+    "--config"  # begins the recorded words of a request on a stored configuration
+)
 
 
 class DerivedValueWarning(UserWarning):
@@ -44,32 +46,59 @@ class Request:
 
 
 def read_request(
-    overrides: Sequence[str], *, config_dir: str | Path | None = None
+    overrides: Sequence[str],
+    *,
+    config_dir: str | Path | None = None,
+    stored: str | Path | None = None,
 ) -> Request:
     """Compose the configuration for one job.
 
+    Options that the package does not have are looked for in ``config_dir``, else in ./configs.
     A ``fault.key=value`` is applied to every class of the plan whose option has that key, and
     pinned there. The whole configuration is composed once; fault options of classes are composed
     alone.
+
+    Parameters
+    ----------
+    overrides : ``group=option`` and ``key=value`` as typed
+    config_dir : folder of a user's own options
+    stored : ``config.yaml`` of a data set or its folder, which takes the place of the options;
+        its data set is made again where nothing is typed
 
     Raises
     ------
     ConfigError    with one line, for anything that cannot be used
     """
-    words = _typed_words(overrides)
-    base = compose(CONFIG_NAME, words.others, config_dir=config_dir).plain()
+    words, typed = typed_words(overrides), tuple(overrides)
+    if stored is None:
+        return with_own_options(
+            lambda folder: _request(OptionFiles(words=words, config_dir=folder), typed),
+            config_dir,
+        )
+    content = read_stored(stored)
+    typed = (f"{STORED_FLAG} {stored}", *typed)
+    return with_own_options(
+        lambda folder: _request(
+            StoredConfiguration(words=words, config_dir=folder, content=content), typed
+        ),
+        config_dir,
+    )
+
+
+def _request(source: Source, overrides: tuple[str, ...]) -> Request:
+    """Request of typed words on top of what a source has."""
+    words = source.words
+    base = source.base()
     _check_shape(base)
     notes = _plan_of_life(words, base)
     listed = base["plan"]["classes"]
     names = _class_names(words, base)
-    selected = _class_fault(words, words.keys.get("fault"), base["fault"], config_dir)
+    selected = _class_fault(source, words.keys.get("fault"), base["fault"])
     faults = {name: selected for name in names}
     if listed and "fault" not in words.keys:
-        options_of = {
-            name: _fault_option(words, name, (), config_dir) for name in names
-        }
+        options_of = {name: source.fault_option(name) for name in names}
         faults = {
-            name: _class_fault(words, name, option, config_dir)
+            name: _class_fault(source, name, option)
             for name, option in options_of.items()
         }
     _refuse_unused(words, [selected, *faults.values()])
@@ -94,54 +123,11 @@ def read_request(
         name: copy.deepcopy(fault.option) for name, fault in faults.items()
     }
     _reset_derived(base["gear"], set(words.keys) | set(base["plan"]["vary"]))
-    config = settle_courses(Configuration(base), words.keys)
-    return Request(config=config, overrides=tuple(overrides), notes=tuple(notes))
+    config = settle_courses(Configuration(base), source.pinned_keys())
+    return Request(config=config, overrides=overrides, notes=tuple(notes))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Words:
-    """Typed overrides by what they are for.
-
-    Attributes
-    ----------
-    keys : keys and groups, each with its value as text
-    plan_vary, fault_vary : content of ``plan.vary={...}`` and ``fault.vary={...}``
-    fault_words : override of each typed key of the fault
-    others : all the rest
-    """
-
-    keys: Mapping[str, str]
-    plan_vary: Mapping[str, Any]
-    fault_vary: Mapping[str, Any]
-    fault_words: Mapping[str, str]
-    others: tuple[str, ...]
-
-    def clears(self, key: str) -> bool:
-        """Return whether an empty mapping was typed for ``plan.vary`` or ``fault.vary``."""
-        return key in self.keys and not (
-            self.plan_vary if key == "plan.vary" else self.fault_vary
-        )
-
-
-def _typed_words(overrides: Sequence[str]) -> _Words:
-    keys = override_keys(overrides)
-    plan_vary, fault_vary = (typed_mapping(overrides, key) for key in VARY_KEYS)
-    plain = [
-        word
-        for word in overrides
-        if not word.startswith(tuple(f"{key}=" for key in VARY_KEYS))
-    ]
-    of_fault = [word for word in plain if word.lstrip("+").startswith("fault.")]
-    return _Words(
-        keys=keys,
-        plan_vary=plan_vary,
-        fault_vary=fault_vary,
-        fault_words={word.lstrip("+").partition("=")[0]: word for word in of_fault},
-        others=tuple(word for word in plain if word not in of_fault),
-    )
-
-
-def _plan_of_life(words: _Words, base: dict[str, Any]) -> list[str]:
+def _plan_of_life(words: Words, base: dict[str, Any]) -> list[str]:
     """Give lives the plan that they need, where none is typed; returns the note.
 
     Lives and their snapshots say how many records there are, and their laws which faults grow.
@@ -163,7 +149,7 @@ def _plan_of_life(words: _Words, base: dict[str, Any]) -> list[str]:
     return [f"lives have {', '.join(brought)}"]
 
 
-def _class_names(words: _Words, base: Mapping[str, Any]) -> list[str]:
+def _class_names(words: Words, base: Mapping[str, Any]) -> list[str]:
     """Fault options of the plan's classes."""
     names = base["plan"]["classes"] or [base["fault"]["kind"]]
     if "fault" in words.keys:
@@ -190,15 +176,13 @@ class _ClassFault:
 
 
 def _class_fault(
-    words: _Words,
-    name: str | None,
-    option: dict[str, Any],
-    config_dir: str | Path | None,
+    source: Source, name: str | None, option: dict[str, Any]
 ) -> _ClassFault:
     """A fault option with the typed keys that it has.
 
     ``name`` None for that of the whole configuration.
     """
+    words = source.words
     typed = {
         key: word
         for key, word in words.fault_words.items()
@@ -206,78 +190,20 @@ def _class_fault(
     }
     typed.pop("fault.vary", None)
     if typed:
-        option = _fault_option(words, name, tuple(typed.values()), config_dir)
+        option = source.fault_option(name, tuple(typed.values()))
     known = {key: spec for key, spec in words.fault_vary.items() if key in option}
     vary = dict(known)
     if not words.clears("fault.vary"):
         vary = {**(option.get("vary") or {}), **known}
     left = {key: spec for key, spec in vary.items() if f"fault.{key}" not in typed}
     return _ClassFault(
-        option=_with_whole_parts({**option, "vary": left}, words, config_dir),
+        option=_with_whole_parts({**option, "vary": left}, source),
         used=frozenset({*typed, *(f"fault.{key}" for key in known)}),
         pinned=tuple(f"fault.{key}" for key in vary if f"fault.{key}" in typed),
     )
 
 
-def _fault_option(
-    words: _Words,
-    name: str | None,
-    fault_words: tuple[str, ...],
-    config_dir: str | Path | None,
-) -> dict[str, Any]:
-    """A fault option by its name, with words that its keys are given by.
-
-    Its file is composed alone, which takes a third of the time. The whole configuration is
-    composed where the name is not known, where an experiment sets keys of the fault, and where
-    composing alone fails: for an option of one's own that refers to another group, and for its
-    message where no such option exists.
-    """
-    removed = tuple(word for word in words.others if word.startswith("~fault."))
-    if name is not None and not _experiment_sets_fault(
-        words.keys.get("experiment"), config_dir
-    ):
-        try:
-            return copy.deepcopy(
-                _option_alone(name, (*removed, *fault_words), config_dir)
-            )
-        except ConfigError:
-            pass
-    others = [
-        word for word in words.others if name is None or not word.startswith("fault=")
-    ]
-    chosen = [] if name is None else [f"fault={name}"]
-    whole = compose(
-        CONFIG_NAME, [*others, *chosen, *fault_words], config_dir=config_dir
-    )
-    return whole["fault"].plain()
-
-
-def _experiment_sets_fault(
-    experiment: str | None, config_dir: str | Path | None
-) -> bool:
-    """True where an experiment's file sets keys of any chosen fault, such as its gear."""
-    if experiment in (None, "null"):
-        return False
-    keys = option_files.option_keys("experiment", experiment, config_dir)
-    return any(key.name.startswith("fault.") for key in keys)
-
-
-def _option_alone(
-    name: str, words: tuple[str, ...], config_dir: str | Path | None
-) -> dict[str, Any]:
-    if config_dir is not None:
-        return compose(f"fault/{name}", words, config_dir=config_dir)["fault"].plain()
-    return _packaged_option(name, words)
-
-
-@functools.lru_cache(maxsize=64)
-def _packaged_option(name: str, words: tuple[str, ...]) -> dict[str, Any]:
-    return compose(f"fault/{name}", words)["fault"].plain()
-
-
-def _with_whole_parts(
-    fault: dict[str, Any], words: _Words, config_dir: str | Path | None
-) -> dict[str, Any]:
+def _with_whole_parts(fault: dict[str, Any], source: Source) -> dict[str, Any]:
     """A compound fault whose parts have every key.
 
     What a part leaves out is its kind's option, ``vary`` included.
@@ -290,7 +216,7 @@ def _with_whole_parts(
             raise ConfigError(
                 f"fault.parts: kind = {part.get('kind')!r}; give the kind of one single fault"
             )
-        option = _fault_option(words, part["kind"], (), config_dir)
+        option = source.fault_option(part["kind"])
         vary = {
             key: spec
             for key, spec in (option.get("vary") or {}).items()
@@ -300,7 +226,7 @@ def _with_whole_parts(
     return {**fault, "parts": parts}
 
 
-def _refuse_unused(words: _Words, faults: Sequence[_ClassFault]) -> None:
+def _refuse_unused(words: Words, faults: Sequence[_ClassFault]) -> None:
     """Raise for a typed key that no class of the plan has."""
     typed = {*words.fault_words, *(f"fault.{key}" for key in words.fault_vary)}
     unused = typed.difference(*(fault.used for fault in faults))
@@ -308,7 +234,7 @@ def _refuse_unused(words: _Words, faults: Sequence[_ClassFault]) -> None:
         raise ConfigError(_no_such_fault_key(sorted(unused)[0], faults[0].option))
 
 
-def _pin_varied(words: _Words, plan: dict[str, Any]) -> list[str]:
+def _pin_varied(words: Words, plan: dict[str, Any]) -> list[str]:
     """Put what is drawn into ``plan``; returns the typed keys, which are no longer drawn."""
     vary = dict(words.plan_vary)
     if not words.clears("plan.vary"):
@@ -317,7 +243,7 @@ def _pin_varied(words: _Words, plan: dict[str, Any]) -> list[str]:
     return [key for key in vary if key in words.keys]
 
 
-def _keep_typed_gear(words: _Words, plan: dict[str, Any]) -> list[str]:
+def _keep_typed_gear(words: Words, plan: dict[str, Any]) -> list[str]:
     """Leave faults on the gear that was typed, where an option draws it; returns the note."""
     typed = [key for key in ("fault.gear", "fault.parts") if key in words.keys]
     drawn = plan.get("fault_gear", AS_GIVEN) != AS_GIVEN
@@ -409,5 +335,5 @@ def _reset_derived(gear: dict[str, Any], touched: set[str]) -> None:
                     "derived from a solid disc now"
                 ),
                 DerivedValueWarning,
-                stacklevel=3,
+                stacklevel=6,  # the caller of read_request
             )

@@ -16,10 +16,11 @@ from gensig.dataset.folder.failures import commonest
 from gensig.dataset.plan import Plan, plan_text
 from gensig.execution.base import read_n_workers
 from gensig.options.configuration import Configuration
-from gensig.plan.make import describe_design, make_plan
+from gensig.plan.make import describe_design, make_plan, varied_keys
 from gensig.plan.notes import n_different
 from gensig.production.folder import block_length, open_shard
 from gensig.record.simulate import Record, forget_twins, simulate_records
+from gensig.text.amounts import duration_text, size_text
 
 # Bytes of index, cards and configuration; more for each shard, record (splits) and class (figure).
 OTHER_BYTES, BYTES_PER_SHARD, BYTES_PER_RECORD, BYTES_PER_CLASS = (
@@ -41,7 +42,7 @@ def predict(
     *,
     on_plan: Callable[[Plan, int], None] = lambda _plan, _n_timed: None,
 ) -> dict[str, str]:
-    """Facts of a data set that is not made yet, by name, as text.
+    """Facts of a data set that is not made yet, by name, as text; ``varies`` has a line a key.
 
     A block of its first records is simulated and stored in a temporary folder. Time is that of a
     machine like this one with as many workers; start-up is counted for the workers of this
@@ -79,20 +80,30 @@ def predict(
     examples = table.examples()
     classes = Counter(str(name) for name in examples.columns["label_name"])
     return {
-        "records": f"{examples.n_records}",
+        "records": f"{examples.n_records:,}",
         **_references(table),
-        "classes": ", ".join(f"{name} {count}" for name, count in classes.items()),
-        "units": f"{n_different(table, 'unit_id')}",
-        "specimens": f"{n_different(table, 'specimen_id')} (sets of gears)",
-        "gearboxes": f"{n_different(table, 'gearbox_id')}",
-        "conditions": f"{n_different(examples, 'condition_id')}",
+        "classes": ", ".join(f"{name} {count:,}" for name, count in classes.items()),
+        "units": f"{n_different(table, 'unit_id'):,}",
+        "specimens": f"{n_different(table, 'specimen_id'):,} (sets of gears)",
+        "gearboxes": f"{n_different(table, 'gearbox_id'):,}",
+        "conditions": f"{n_different(examples, 'condition_id'):,}",
         "design": describe_design(config),
         "repeats": f"{config['plan']['n_repeats']}",
+        "varies": _varied(config),
         "shards": f"{table.n_shards} of at most {max(table.shard_sizes())} records",
-        "bytes": f"{n_bytes:,} ({n_bytes / 1e6:.3g} MB)",
-        "time": f"about {max(1, round(total))} s on {workers} worker(s), "
+        "bytes": f"{n_bytes:,} ({size_text(n_bytes)})",
+        "time": f"about {duration_text(total)} on {workers} worker(s), "
         f"from {seconds / len(probe):.3g} s a record measured now",
     }
+
+
+def _varied(config: Configuration) -> str:
+    """Varied keys with their ranges, a line each."""
+    varied = varied_keys(config)
+    if not varied:
+        return "no key; records differ in start, noise and, by unit, in their errors"
+    width = max(map(len, varied))
+    return "\n".join(f"{key:<{width}}  {text}" for key, text in varied.items())
 
 
 def _references(table: Plan) -> dict[str, str]:
@@ -101,7 +112,7 @@ def _references(table: Plan) -> dict[str, str]:
     if not n_reference:
         return {}
     each = n_reference // n_different(table, "unit_id")
-    return {"references": f"{n_reference} more ({each} a unit, sound, in no split)"}
+    return {"references": f"{n_reference:,} more ({each} a unit, sound, in no split)"}
 
 
 def _warn_of_failed(records: Sequence[Record]) -> None:

@@ -25,8 +25,8 @@ TORQUE_KEY, UNIT_LOAD = "operating.torque_nm", "unit_load"
 class DatasetOptions:
     """Signals that a data set stores, and how its shards hold them.
 
-    ``records_per_shard`` None means about 64 MB of samples. Each ``store_`` switch adds signals;
-    see ``configs/generate.yaml``.
+    ``records_per_shard`` None means a number that grows with the set. Each ``store_`` switch
+    adds signals; see ``configs/generate.yaml``.
     """
 
     records_per_shard: int | None

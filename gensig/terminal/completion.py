@@ -10,6 +10,7 @@ import functools
 import os
 from argparse import Namespace
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 COMMANDS = ("gensig", "diagnose")
@@ -75,9 +76,10 @@ def candidates(
         options,
         section_keys,
         sections,
+        user_folder,
     )
 
-    folder = getattr(parsed_args, "config_dir", None)
+    folder = getattr(parsed_args, "config_dir", None) or user_folder()
     offered = {
         group.name: group for group in groups(folder) if group.primary == primary
     }
@@ -106,9 +108,9 @@ def candidates(
 
 def what_candidates(prefix: str, parsed_args: Any, **_: Any) -> dict[str, str]:
     """Candidates for ``gensig options``: groups, sections, and options of a group."""
-    from gensig.options.files import groups, sections
+    from gensig.options.files import groups, sections, user_folder
 
-    folder = getattr(parsed_args, "config_dir", None)
+    folder = getattr(parsed_args, "config_dir", None) or user_folder()
     name, equals, _value = prefix.partition("=")
     if equals:
         return _options_of(name, folder)
@@ -116,7 +118,7 @@ def what_candidates(prefix: str, parsed_args: Any, **_: Any) -> dict[str, str]:
     return result | dict.fromkeys(sections(), "keys without a choice")
 
 
-def _options_of(group: str, folder: str | None) -> dict[str, str]:
+def _options_of(group: str, folder: str | Path | None) -> dict[str, str]:
     from gensig.options.files import options
 
     return {f"{group}={option.name}": option.about for option in options(group, folder)}

@@ -21,6 +21,18 @@ HELP_FLAGS = ("-h", "--help")
 # how argparse begins what it says of words that it does not know, and of words that it misses
 UNKNOWN = "unrecognized arguments: "
 MISSING = "the following arguments are required: "
+# flags that people type for keys of the overrides
+KEYS_FOR_FLAGS = {
+    "--data": "data=DIR",
+    "--out": "out=DIR",
+    "--seed": "seed=N",
+    "--seeds": "'seeds=[0,1]'",
+    "--epochs": "epochs=N",
+    "--fault": "fault=NAME",
+    "--gear": "gear=NAME",
+}
+MULTIRUN_FLAGS = ("-m", "--multirun")
+OF_MULTIRUN = "gensig generate, gensig plan and diagnose train"
 NUMBERS: dict[Any, str] = {int: "whole number", float: "number"}
 
 
@@ -97,9 +109,16 @@ class Parser(argparse.ArgumentParser):
             return f"'{word}' is one word too many"
         known = [name for name in self._option_string_actions if name.startswith("--")]
         name, equals, _ = word.partition("=")
-        if equals and not nearest.near(name, known):
+        takes_keys = any(action.dest == "overrides" for action in self._actions)
+        if name in MULTIRUN_FLAGS:
+            return f"no flag '{name}' here: {OF_MULTIRUN} take it"
+        begun = any(flag.startswith(name) for flag in known)
+        is_key = takes_keys and name in KEYS_FOR_FLAGS and not begun
+        if equals and (is_key or not nearest.near(name, known)):
             text = word.lstrip("-")
             return f"no flag '{word}'; groups and keys have no dashes: {text}"
+        if is_key:
+            return f"no flag '{name}'; type {KEYS_FOR_FLAGS[name]}"
         return f"no flag '{word}'; {nearest.hint(name, known)}"
 
     def _values_of(self, name: str) -> str:
@@ -150,7 +169,7 @@ def refuse_verb(
     raise ConfigError(f"no command '{word}'; {nearest.hint(word, verbs)}")
 
 
-def guarded(program: str, run: Callable[[], int], *, interrupted: str) -> int:
+def guarded(program: str, run: Callable[[], int]) -> int:
     """Run a command and return its exit status.
 
     A mistake, a file that cannot be used and an interruption become one line on stderr.
@@ -170,8 +189,8 @@ def guarded(program: str, run: Callable[[], int], *, interrupted: str) -> int:
         if error.filename:
             message = f"{error.filename}: {message}"
         return complain(program, message)
-    except KeyboardInterrupt:
-        complain(program, interrupted)
+    except KeyboardInterrupt as interruption:
+        complain(program, str(interruption) or "interrupted")
         return INTERRUPTED
 
 

@@ -8,6 +8,8 @@ import time
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from gensig.text.amounts import duration_text, size_text
+
 LINE_SECONDS = 5.0
 COMPILING = "compiling, once on this machine: up to half a minute"
 
@@ -161,11 +163,12 @@ class RunProgress:
         if self._first is None:
             self._first = now, n_made
         rate = self._rate(now, n_made)
-        left = _duration((self.n_records - self._n_done) / rate)
+        n_left = self.n_records - self._n_done
         text = f"{rate:.1f} records/s"
         if self._last is not None and self._last.n_bytes:
-            text += f", {self._last.n_bytes / 1e6:.1f} MB"
-        text += f", {left} left"
+            text += f", {size_text(self._last.n_bytes)}"
+        if n_left:
+            text += f", {duration_text(n_left / rate)} left"
         if self._last is not None and self._last.n_failed:
             text += f", {self._last.n_failed} failed"
         return text
@@ -187,13 +190,3 @@ def _is_interactive() -> bool:
     from rich.console import Console
 
     return Console().is_jupyter
-
-
-def _duration(seconds: float) -> str:
-    """A time for reading, such as '42 s', '3 min 10 s', '2 h 5 min'."""
-    minutes, seconds = divmod(round(seconds), 60)
-    if not minutes:
-        return f"{seconds} s"
-    if minutes < 60:
-        return f"{minutes} min {seconds} s"
-    return f"{minutes // 60} h {minutes % 60} min"

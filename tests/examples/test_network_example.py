@@ -57,7 +57,7 @@ def test_it_is_trained_stored_and_loaded(data, words, tmp_path):
     file, rate = tmp_path / "a.npz", data.sampling_rate
     np.savez(file, acceleration=data.signals(0), sampling_rate_hz=rate)
     assert main(["predict", "--model", str(folder), str(file)]) in (0, 3)
-    assert main(["evaluate", "data=any", f"model_dir={folder}"]) == 0
+    assert main(["evaluate", "data=any", f"--model={folder}"]) == 0
 
 
 def test_it_is_deterministic_and_reads_the_declared_input(data):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.commands.console import one_line_warnings, remark
+from gensig.commands.console import remark
 from gensig.commands.figures.flank_figures import (
     plot_sliced_stiffness,
     plot_transmission_error,
@@ -28,6 +28,7 @@ from gensig.mesh.options import MOST_SLICES
 from gensig.options.configuration import Configuration
 from gensig.systems.registry import read_sliced_pair
 from gensig.systems.sliced_pair import SlicedPair, TransmissionError
+from gensig.terminal.warning_lines import one_line_warnings
 
 TOLERATED = 0.01  # error of a pressure that is not told
 LOST_SHARE = 0.02  # of the bearing field; less is the edge of the reliefs

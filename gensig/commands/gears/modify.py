@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from gensig.commands.console import one_line_warnings, step
+from gensig.commands.console import step
 from gensig.commands.figures.flank_figures import plot_front
 from gensig.commands.gears.flanks import sound_pair
 from gensig.commands.output import (
@@ -22,6 +22,7 @@ from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification, PairModification
 from gensig.systems.flank_optimum import Cases, Optimum, judge, optimise
 from gensig.systems.sliced_pair import SlicedPair
+from gensig.terminal.warning_lines import one_line_warnings
 from gensig.units import from_si
 
 GROUP = "modification"

@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from gensig.commands.console import one_line_warnings, remark
+from gensig.commands.console import remark
 from gensig.commands.figures.wear_figure import plot_wear_life
 from gensig.commands.gears.wear_summary import print_wear_life
 from gensig.commands.output import (
@@ -37,6 +37,7 @@ from gensig.life.wear.wear_life import WearLife, hours, wear_life
 from gensig.operation.options import read_operating
 from gensig.record.vibration_limit import WornVibration, limited_by_vibration
 from gensig.systems.wear import read_wear_case, wear_fault
+from gensig.terminal.warning_lines import one_line_warnings
 
 Array = NDArray[np.float64]
 

@@ -296,12 +296,6 @@ def plan_lines(
             "assumed",
         ),
     ]
-    if wishes.is_realistic:
-        remark = "whole groups; small shards keep two workers busy to the end"
-        lines += [
-            "dataset:",
-            remarked(f"  records_per_shard: {4 * len(classes)}", remark),
-        ]
     return lines
 
 

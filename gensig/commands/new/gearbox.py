@@ -131,7 +131,7 @@ def _ask(question: str, counts: Sequence[int], *, needed: bool) -> Any:
     if question == NEEDED[0][1]:
         kind = int
     while True:
-        words = input(f"{question}: ").replace(",", " ").split()
+        words = _typed_line(question).replace(",", " ").split()
         if not words and not needed:
             return None
         try:
@@ -141,6 +141,17 @@ def _ask(question: str, counts: Sequence[int], *, needed: bool) -> Any:
         if len(numbers) in counts:
             return numbers
         print(f"give {_counts(counts)} number{'s' * (max(counts) > 1)}")
+
+
+def _typed_line(question: str) -> str:
+    """The answer to a question; ConfigError where the input ends, as by Ctrl-D."""
+    try:
+        return input(f"{question}: ")
+    except EOFError:
+        print()  # the cursor stands behind the question
+        raise ConfigError(
+            f"the input ended before an answer to '{question}'; nothing is written"
+        ) from None
 
 
 def _counts(counts: Sequence[int]) -> str:

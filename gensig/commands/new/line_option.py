@@ -132,11 +132,6 @@ def staged_experiment_text(
     lines += [
         *plan_lines(stages[0], wishes, classes, n_records),
         remarked("  fault_gear: drawn", "any gear, by equal chance"),
-        "dataset:",
-        remarked(
-            f"  records_per_shard: {4 * len(classes)}",
-            "whole groups; small shards keep two workers busy to the end",
-        ),
     ]
     return "\n".join(lines) + "\n"
 

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
-from gensig.options.compose import options
+from gensig.options.files import USER_FOLDER
+from gensig.options.groups import options
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 from gensig.text.option_writing import is_option_name
@@ -71,8 +72,10 @@ def _write(file: Path, text: str) -> None:
 
 
 def next_commands(folder: Path, name: str) -> Sequence[str]:
-    """Commands on a new gearbox, as they are typed."""
-    words = f"--config-dir {shlex.quote(str(folder))} experiment={name}"
+    """Commands on a new gearbox, as they are typed; ./configs needs no flag."""
+    words = f"experiment={name}"
+    if folder != Path(USER_FOLDER):
+        words = f"--config-dir {shlex.quote(str(folder))} {words}"
     return [
         f"gensig simulate {words} fault=missing_tooth --plot {name}.png",
         f"gensig generate {words} out=runs/{name}",

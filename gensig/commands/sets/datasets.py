@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from argparse import Namespace
 from collections.abc import Sequence
@@ -11,16 +12,17 @@ from typing import TYPE_CHECKING
 import yaml
 
 from gensig.commands.console import note, remark, step
-from gensig.dataset.folder.beginning import refuse_used
+from gensig.commands.sets.jobs import Job, read_jobs, typed_words
+from gensig.dataset.folder.beginning import config_text, refuse_used
 from gensig.dataset.folder.failures import commonest, failure_reasons
 from gensig.dataset.folder.joining import joined_folder
 from gensig.dataset.folder.layout import CONFIG_BYTES_LIMIT, MANIFEST, OVERRIDES
 from gensig.dataset.folder.manifest import read_manifest
 from gensig.dataset.storage.atomic import read_text
-from gensig.errors import ConfigError
-from gensig.options.compose import job_folders, override_keys, sweep
+from gensig.errors import ConfigError, Interrupted
+from gensig.options.compose import override_keys
 from gensig.options.configuration import Configuration
-from gensig.plan.request import Request, read_request
+from gensig.plan.request import STORED_FLAG, Request, read_request
 from gensig.terminal.run_progress import RunProgress
 
 if TYPE_CHECKING:
@@ -32,36 +34,34 @@ def generate(arguments: Namespace) -> int:
     """Make one data set, or with -m one for each combination of values."""
     from gensig.execution.registry import read_executor
 
-    jobs = [arguments.overrides]
-    if arguments.multirun:
-        jobs = sweep(arguments.overrides)
-    requests = [read_request(job, config_dir=arguments.config_dir) for job in jobs]
-    parents = {str(request.config["out"]) for request in requests}
-    if requests[0].config["out"] in (None, ""):
+    jobs = read_jobs(arguments)
+    if jobs[0].folder is None:
         raise ConfigError(
             "out is required: give out=DIR, a folder that does not exist or is empty"
         )
-    if len(parents) > 1:
-        raise ConfigError(
-            "out must be one folder; with -m each data set gets a folder below it"
-        )
-    executors = [read_executor(request.config["executor"]) for request in requests]
+    executors = [read_executor(job.request.config["executor"]) for job in jobs]
     if not executors[0].closes:
         if arguments.multirun:
             raise ConfigError(
                 "-m makes several data sets; an array job makes one: "
-                "plan each with --freeze"
+                "plan them with --freeze"
             )
         return _generate_share(executors[0], arguments)
-    parent = Path(parents.pop()).expanduser()
-    refuse_used(parent)
-    folders = [parent]
-    if arguments.multirun:
-        folders = [parent / name for name in job_folders(jobs)]
+    refuse_used(_parent(jobs))
     return max(
-        _generate(request, folder, executor, arguments)
-        for request, folder, executor in zip(requests, folders, executors, strict=True)
+        _generate(job.request, job.folder, executor, arguments)
+        for job, executor in zip(jobs, executors, strict=True)
+        if job.folder is not None
     )
+
+
+def _parent(jobs: Sequence[Job]) -> Path:
+    """The folder that all data sets are made in; of one without a name its own."""
+    folder = jobs[0].folder
+    assert folder is not None
+    if jobs[0].name:
+        return folder.parent
+    return folder
 
 
 def _generate(
@@ -89,7 +89,8 @@ def _generate(
 
 def _generate_share(executor: Executor, arguments: Namespace) -> int:
     """One task of an array job: its shards of a folder that was planned before."""
-    out = Path(override_keys(arguments.overrides)["out"]).expanduser()
+    words = typed_words(arguments)
+    out = Path(override_keys(words)["out"]).expanduser()
     if not (out / MANIFEST).is_file():
         raise ConfigError(
             f"out={out}: a task joins a frozen folder; "
@@ -104,7 +105,7 @@ def _generate_share(executor: Executor, arguments: Namespace) -> int:
         arguments,
         n_records=sum(manifest.shards[index].rows for index in mine),
         begin=begin,
-        asked=_asked(out, arguments.overrides, arguments.config_dir),
+        asked=_asked(out, words, arguments.config_dir, arguments.config),
         of_task=True,
     )
 
@@ -123,22 +124,33 @@ def _run(
     from gensig.production.folder import run_folder
     from gensig.production.record_counts import record_counts
 
-    advice = f"{out} is incomplete; gensig resume {out} tries the missing shards again"
+    folder = shlex.quote(str(out))
+    advice = (
+        f"{out} is incomplete; gensig resume {folder} tries the missing shards again"
+    )
     records = f"{n_records} records"
-    following = f"gensig inspect {out} describes them"
+    following = f"gensig inspect {folder} describes them"
+    going_on = f"and gensig resume {folder} finishes it"
     if of_task:
+        going_on = "and the same command goes on with this task's share"
         advice = "this task's share is incomplete; the same command tries again"
         records += " of this task"
-        following = f"gensig finalize {out}"
-    with (
-        record_counts(len(read_manifest(out).shards)) as counts,
-        RunProgress(
+        following = f"gensig finalize {folder}"
+    with record_counts(len(read_manifest(out).shards)) as counts:
+        progress = RunProgress(
             quiet=arguments.quiet, n_records=n_records, counts=counts
-        ) as progress,
-    ):
-        n_failed, problems = run_folder(
-            out, executor=executor, on_shard=progress, asked=asked, counts=counts
         )
+        try:
+            with progress:
+                n_failed, problems = run_folder(
+                    out,
+                    executor=executor,
+                    on_shard=progress,
+                    asked=asked,
+                    counts=counts,
+                )
+        except KeyboardInterrupt:
+            raise Interrupted(f"interrupted; {out} is incomplete, {going_on}") from None
     for problem in problems:
         remark(problem)
     if problems:
@@ -152,13 +164,19 @@ def _run(
 
 
 def _asked(
-    out: Path, overrides: Sequence[str], config_dir: str | None = None
+    out: Path,
+    overrides: Sequence[str],
+    config_dir: str | None = None,
+    stored: str | None = None,
 ) -> Configuration | None:
     """Configuration of a folder's recorded overrides and those typed now.
 
-    None where the typed ones change nothing that decides bits.
+    ``stored`` is the file of ``--config``, which takes the place of the recorded ones. None where
+    the typed ones change nothing that decides bits.
     """
     words = [word for word in overrides if not _is_free(word)]
+    if stored is not None:
+        return read_request(words, config_dir=config_dir, stored=stored).config
     if not words:
         return None
     keys = {_key(word) for word in words}
@@ -168,6 +186,8 @@ def _asked(
         recorded = [str(word) for word in content]
     kept = [word for word in recorded if not _is_free(word) and _key(word) not in keys]
     try:
+        if recorded and recorded[0].startswith(STORED_FLAG):
+            return read_request(words, config_dir=config_dir, stored=out).config
         return read_request([*kept, *words], config_dir=config_dir).config
     except ConfigError as error:
         if config_dir is not None:
@@ -247,31 +267,52 @@ def _print_failed(out: Path, n_failed: int, n_records: int) -> None:
 
 
 def plan(arguments: Namespace) -> int:
-    """Print records, bytes and time of a data set; with --freeze make its folder too."""
+    """Print records, bytes and time of each data set; with --freeze make its folder too."""
+    jobs = read_jobs(arguments)
+    if arguments.show_config or arguments.cfg is not None:
+        return _show_configurations(jobs)
+    if arguments.freeze:
+        if jobs[0].folder is None:
+            raise ConfigError(
+                "--freeze makes a folder: "
+                "give out=DIR, one that does not exist or is empty"
+            )
+        refuse_used(_parent(jobs))
+    for number, job in enumerate(jobs):
+        if job.name:
+            print("\n" * (number > 0) + job.name, flush=True)
+        _plan(job, freeze=arguments.freeze)
+    return 0
+
+
+def _show_configurations(jobs: Sequence[Job]) -> int:
+    """Print the configuration of each data set as its ``config.yaml`` would hold it."""
+    for job in jobs:
+        if job.name:
+            print(f"--- # {job.name}")
+        print(config_text(job.request.config.with_entries(out=None).plain()), end="")
+    return 0
+
+
+def _plan(job: Job, *, freeze: bool) -> None:
     from gensig.plan.doubts import plan_doubts
     from gensig.plan.notes import plan_notes
     from gensig.production.folder import begin_folder
     from gensig.production.prediction import predict
 
-    request = read_request(arguments.overrides, config_dir=arguments.config_dir)
-    out = request.config["out"]
-    if arguments.freeze:
-        if out is None:
-            raise ConfigError(
-                "--freeze makes a folder: "
-                "give out=DIR, one that does not exist or is empty"
-            )
-        begin_folder(request.config, request.overrides, Path(str(out)).expanduser())
+    config, out = job.request.config, job.folder
+    if freeze and out is not None:
+        begin_folder(config, job.request.overrides, out)
         print(
             f"{out} is planned; gensig resume {out} makes it here, "
             "tasks with executor=slurm as an array job"
         )
 
     def on_plan(table: Plan, n_timed: int) -> None:
-        note(*request.notes, *plan_notes(request.config, table))
-        note(*plan_doubts(request.config, table))
+        note(*job.request.notes, *plan_notes(config, table))
+        note(*plan_doubts(config, table))
         step(f"making {n_timed} of {table.n_records} records to time them")
 
-    for name, value in predict(request.config, on_plan=on_plan).items():
-        print(f"{name:<11}{value}")
-    return 0
+    for name, value in predict(config, on_plan=on_plan).items():
+        indented = value.replace("\n", f"\n{'':<11}")
+        print(f"{name:<11}{indented}")

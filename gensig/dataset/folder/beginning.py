@@ -72,9 +72,9 @@ def create_folder(
             f"identity {identity[:12]} does not belong to this configuration; use "
             "identity_hash(config, ...)"
         )
-    stored, typed = stored_config(config), list(map(str, overrides))
+    typed = list(map(str, overrides))
     texts = {
-        CONFIG: yaml.safe_dump(stored, sort_keys=False, allow_unicode=True),
+        CONFIG: config_text(config),
         OVERRIDES: yaml.safe_dump(typed, allow_unicode=True),
         PLAN: plan_text(plan),
     }
@@ -118,6 +118,12 @@ def create_folder(
         if isinstance(error, OSError):
             raise cannot_write(out, error) from error
         raise
+
+
+def config_text(config: ConfigContent) -> str:
+    """A configuration as `config.yaml` holds it."""
+    stored = stored_config(config)
+    return yaml.safe_dump(stored, sort_keys=False, allow_unicode=True)
 
 
 def refuse_used(out: Path) -> None:

@@ -138,6 +138,10 @@ def read_manifest(folder: Path) -> Manifest:
     folder = Path(folder)
     path = folder / MANIFEST
     if not path.is_file():
+        if not folder.exists():
+            raise DatasetError(
+                f"{folder} does not exist; give the folder that `gensig generate` made"
+            )
         if (folder / BEGINNING).is_file():
             raise DatasetError(
                 f"{folder} holds no record: its run was killed before the plan was on disk; give "
@@ -256,7 +260,11 @@ def read_config(folder: Path) -> ConfigContent:
 
     DatasetError when it is anything else.
     """
-    path = Path(folder) / CONFIG
+    return read_config_file(Path(folder) / CONFIG)
+
+
+def read_config_file(path: Path) -> ConfigContent:
+    """A configuration as plain data, see `read_config`."""
     text = read_text(path, limit=CONFIG_BYTES_LIMIT)
     try:
         _refuse_yaml_bombs(text, path)

@@ -1,5 +1,6 @@
 """Files that are written whole or not at all, and text read with a limit of its size."""
 
+import errno
 import fcntl
 import hashlib
 import os
@@ -11,6 +12,9 @@ from pathlib import Path
 from gensig.errors import DatasetError
 
 TEMPORARY_SUFFIX = ".tmp"
+# causes of a refusal by the disk
+FULL = (errno.ENOSPC, errno.EDQUOT)
+FORBIDDEN = (errno.EACCES, errno.EPERM)
 
 
 def temporary_name(path: Path) -> Path:
@@ -90,11 +94,18 @@ def write_bytes(path: Path, content: bytes | memoryview) -> None:
 
 
 def cannot_write(path: Path, error: Exception) -> DatasetError:
-    """Error of one line for a full disk or a folder without the right to write."""
+    """Error of one line with the cause: a full disk, no right to write, no place for folders."""
     reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
-    return DatasetError(
-        f"cannot write {path}: {reason}; free some space or choose another out=DIR"
-    )
+    remedy = "choose another out=DIR"
+    number = getattr(error, "errno", None)
+    if number in FULL:
+        remedy = f"free some space or {remedy}"
+    elif number == errno.ENOENT:
+        standing = next(folder for folder in path.absolute().parents if folder.exists())
+        reason = f"{standing} takes no new folders or files"
+    elif number in FORBIDDEN:
+        remedy = f"get the right to write there or {remedy}"
+    return DatasetError(f"cannot write {path}: {reason}; {remedy}")
 
 
 def read_text(path: Path, *, limit: int) -> str:

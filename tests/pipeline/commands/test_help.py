@@ -1,5 +1,6 @@
 """Help, examples, exit statuses, notes on unread keys, and the tab key of both commands."""
 
+import itertools
 import json
 import os
 import re
@@ -11,7 +12,7 @@ import pytest
 
 import diagnose.cli
 import gensig.cli
-from gensig.commands.verbs import VERBS
+from gensig.commands.verbs import KNOWN, VERBS
 from gensig.options import files as option_files
 from gensig.options.compose import compose
 
@@ -196,4 +197,19 @@ def test_help_loads_nothing_that_is_slow():
         )
         done = subprocess.run([sys.executable, "-c", code], capture_output=True)
         assert done.returncode == 0
-        assert b"commands:" in done.stdout
+        assert b"usage:" in done.stdout
+
+
+def test_every_verb_stands_once_in_the_help_in_one_of_three_groups(capsys):
+    assert MAIN["gensig"](["--help"]) == 0
+    blocks = capsys.readouterr().out.split("\n\n")
+    shown = {}
+    for block in blocks:
+        head, *lines = block.splitlines()
+        if head in ("data sets:", "gears:", "machines:"):
+            shown[head] = [line.split()[0] for line in lines]
+    assert len(shown) == 3
+    assert sorted(itertools.chain(*shown.values())) == sorted(KNOWN)
+    assert "generate" in shown["data sets:"]
+    assert "stiffness" in shown["gears:"]
+    assert "simulate" in shown["machines:"]

@@ -225,6 +225,22 @@ def test_a_machine_without_records_has_no_level(gensig, tmp_path):
     assert (tmp_path / "gear" / "mine.yaml").exists()
 
 
+def test_the_end_of_the_input_ends_the_questions(tmp_path, monkeypatch, capsys):
+    def ended(_question):
+        raise EOFError
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("builtins.input", ended)
+    terminal = type("Terminal", (), {"isatty": lambda self: True})
+    monkeypatch.setattr(sys, "stdin", terminal())
+    assert main(["new", "gearbox", "mine", "--teeth", "20", "45"]) == 2
+    message = (
+        "the input ended before an answer to 'normal module, mm'; nothing is written"
+    )
+    assert capsys.readouterr().err == f"gensig: {message}\n"
+    assert not list(tmp_path.iterdir())
+
+
 def test_on_a_terminal_it_asks(gensig, tmp_path, monkeypatch):
     answers = itertools.chain(
         ["20", "20, 45", "3", "1500", "60"],  # the first is one number too few

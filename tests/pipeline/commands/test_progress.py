@@ -4,13 +4,14 @@ import os
 import pickle
 import pty
 import re
+import shlex
 import subprocess
 import sys
 import time
 from dataclasses import dataclass, replace
 
 import pytest
-from small_sets import TINY
+from small_sets import TINY, contents, make
 
 from gensig.cli import main
 from gensig.dataset.folder.layout import shard_path
@@ -65,7 +66,7 @@ def test_lines_come_every_few_seconds_and_count_records_of_shards_at_work(
     assert set(before) == {f"0 of 100 records, 0 s; {COMPILING}"}
     assert len(at_work) >= 2
     assert all(re.match(r"7 of 100 records, [0-9.]+ records/s, ", x) for x in at_work)
-    running = r"60 of 100 records, [0-9.]+ records/s, 8\.0 MB, 0 s left, 2 failed"
+    running = r"60 of 100 records, [0-9.]+ records/s, 8 MB, 1 s left, 2 failed"
     assert len(after) >= 2
     assert all(re.fullmatch(running, line) for line in after)
 
@@ -84,14 +85,14 @@ def test_rate_and_time_left_are_those_of_this_run():
     assert progress.facts() == "4.8 records/s, 10 s left"
     counts.n_made = 0
     progress(replace(STATE, n_done=70, n_made=50))
-    assert progress.facts() == "8.0 records/s, 8.0 MB, 4 s left, 2 failed"
+    assert progress.facts() == "8.0 records/s, 8 MB, 4 s left, 2 failed"
 
 
 def test_without_counts_a_record_counts_with_its_shard():
     progress = quiet_progress()
     progress._begin -= 20.0
     progress(STATE)
-    assert progress.facts() == "2.0 records/s, 8.0 MB, 20 s left, 2 failed"
+    assert progress.facts() == "2.0 records/s, 8 MB, 20 s left, 2 failed"
 
 
 def test_workers_tell_their_records_and_their_compiling():
@@ -139,13 +140,6 @@ def test_compiling_is_told_once(monkeypatch, tmp_path):
     assert done.stdout == "1\n"
 
 
-@pytest.mark.parametrize(
-    ("seconds", "text"), [(59.4, "59 s"), (190.0, "3 min 10 s"), (7500.0, "2 h 5 min")]
-)
-def test_durations_are_read_by_people(seconds, text):
-    assert run_progress._duration(seconds) == text
-
-
 def test_a_terminal_shows_a_bar_with_rate_bytes_and_time_left(tmp_path):
     ours, theirs = pty.openpty()
     words = [*TINY, "executor.n_workers=1", f"out={tmp_path / 'x'}"]
@@ -164,7 +158,7 @@ def test_a_terminal_shows_a_bar_with_rate_bytes_and_time_left(tmp_path):
         pass
     os.close(ours)
     assert process.wait(timeout=60) == 0
-    assert re.search(rb"6/6 [0-9.]+ records/s, 0\.2 MB, 0 s left", shown), shown[-500:]
+    assert re.search(rb"6/6 [0-9.]+ records/s, \d+ kB", shown), shown[-500:]
 
 
 def test_the_log_tells_what_happened_and_is_closed_with_the_set(data):
@@ -227,3 +221,34 @@ def test_an_edited_card_is_named_and_accepted_when_asked(data, capsys):
     said(0, "verify")
     shard_path(data, 3).write_bytes(b"short")
     assert "shard-00003.h5 is truncated" in said(1, "verify", "--quick")
+
+
+@pytest.mark.parametrize("folder", ["data", "my data"])
+def test_an_interruption_names_the_folder_to_resume(
+    folder, tmp_path, monkeypatch, capsys
+):
+    def interrupt(_progress, _state):
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    out = tmp_path / folder
+    with monkeypatch.context() as patch:
+        patch.setattr(RunProgress, "__call__", interrupt)
+        assert main(["generate", "--quiet", *TINY, "-j", "1", "--out", folder]) == 130
+        first = capsys.readouterr().err
+        assert main(["resume", "--quiet", "--workers", "1", folder]) == 130
+        assert capsys.readouterr().err == first
+    words = shlex.split(first.partition("and ")[2].removesuffix(" finishes it\n"))
+    assert words == ["gensig", "resume", folder]
+    assert main([*words[1:], "--quiet", "-j", "1"]) == 0
+    plain = make(tmp_path / "plain")
+    assert contents(out) == contents(plain)
+
+
+def test_an_interruption_without_a_data_set_names_none(monkeypatch, capsys):
+    def interrupt(*_words):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gensig.commands.options.groups", interrupt)
+    assert main(["options"]) == 130
+    assert capsys.readouterr().err == "gensig: interrupted\n"

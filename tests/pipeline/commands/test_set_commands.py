@@ -1,10 +1,12 @@
 """simulate, plan and generate as a user types them; see test_progress.py for what they print."""
 
+import itertools
 import re
 
 import h5py
 import numpy as np
 import pytest
+from small_sets import contents
 
 from gensig.cli import main
 
@@ -61,3 +63,31 @@ def test_existing_folder_is_refused_and_untouched(tmp_path, capsys):
     assert "not empty" in capsys.readouterr().err
     assert precious.read_text() == "mine"
     assert list(tmp_path.iterdir()) == [precious]
+
+
+def test_flags_for_keys_are_understood(gensig, tmp_path):
+    small = "plan.n_records=2 operating.duration_s=0.02 sensing.channels=[pinion_y]"
+    gensig(f"generate {small} --out flags -j 1 --quiet")
+    gensig(f"generate {small} out=keys executor.n_workers=1 --quiet")
+    assert contents(tmp_path / "flags") == contents(tmp_path / "keys")
+    text = (tmp_path / "flags" / "config.yaml").read_text()
+    assert text == (tmp_path / "keys" / "config.yaml").read_text()
+
+
+def test_plan_of_several_data_sets_has_a_block_for_each(gensig, tmp_path):
+    line = "plan -m fault=glob(c*,exclude=comp*) plan.n_records=2,3"
+    line += " operating.duration_s=0.02 executor.n_workers=1"
+    said, _ = gensig(f"{line} --freeze out=sets")
+    blocks = said.split("\n\n")
+    names = [block.splitlines()[0] for block in blocks]
+    assert names == [
+        f"{number}-fault={fault},plan.n_records={count}"
+        for number, (fault, count) in enumerate(
+            itertools.product(("chipped", "crack"), (2, 3))
+        )
+    ]
+    counts = [re.search(r"^records +(\d+)$", block, re.M)[1] for block in blocks]
+    assert counts == ["2", "3", "2", "3"]
+    for name in names:
+        assert (tmp_path / "sets" / name / "plan.csv").is_file()
+    assert main(["plan", "-m", "seed=1,2", "--freeze", "out=sets"]) == 2

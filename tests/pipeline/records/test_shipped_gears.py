@@ -8,7 +8,7 @@ from record_sets import records
 
 from diagnose.baselines.features import indicators
 from gensig.driveline.drive_line import read_drive_line
-from gensig.options.compose import options
+from gensig.options.groups import options
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 from gensig.systems.registry import read_pair

@@ -150,7 +150,7 @@ def test_evaluate_repeats_the_test_score_of_its_seed(
 ):
     out = tmp_path / "e"
     model = model_of(trained, "by_unit-seed1")
-    words = ["data=good", f"model_dir={model}", f"out={out}"]
+    words = ["--model", str(model), "data=good", f"out={out}"]
     shown = says(capsys, "evaluate", *words)
     assert "test part of by_unit (the data set it was trained on)" in shown
     result, calibration = metrics_of(out), by_unit["calibration"]
@@ -166,7 +166,7 @@ def test_evaluate_repeats_the_test_score_of_its_seed(
 
 
 def evaluating(trained, name="other"):
-    return ["evaluate", f"data={name}", f"model_dir={model_of(trained)}"]
+    return ["evaluate", f"data={name}", "--model", str(model_of(trained))]
 
 
 def test_evaluate_on_another_data_set_takes_all_records(trained, data, capsys):
@@ -221,15 +221,28 @@ def test_evaluate_refuses_weights_of_another_format(
     description = (trained / "models" / "by_unit-seed0" / "model.json").read_bytes()
     (tmp_path / "model.json").write_bytes(description)
     (tmp_path / "model.safetensors").write_bytes(weights)
-    words = ["evaluate", "data=good", f"model_dir={tmp_path}"]
+    words = ["evaluate", "data=good", "--model", str(tmp_path)]
     refuses(capsys, words, "is not a safetensors file")
 
 
 def test_evaluate_refuses_folders_that_are_no_model(trained, data, capsys, tmp_path):
     words = ["evaluate", "data=good"]
-    message = "choose one of its models, for instance"
-    refuses(capsys, [*words, f"model_dir={trained}"], message)
-    refuses(capsys, [*words, f"model_dir={tmp_path}"], "holds no model.json")
+    models = sorted(map(str, (trained / "models").iterdir()))
+    message = f"choose one of its models: {', '.join(models)}"
+    for folder in (trained, trained / "models"):
+        refuses(capsys, [*words, "--model", str(folder)], message)
+    refuses(capsys, [*words, "--model", str(tmp_path)], "holds no model.json")
+    refuses(capsys, [*words, "--model", str(tmp_path / "x")], "does not exist")
+
+
+def test_the_former_spelling_of_the_model_works_with_a_note(trained, data, capsys):
+    model = str(model_of(trained))
+    shown = says(capsys, "evaluate", "data=good", "--model", model)
+    assert main(["evaluate", "data=good", f"model_dir={model}"]) == 0
+    printed = capsys.readouterr()
+    assert printed.out == shown
+    note = "diagnose: note: model_dir=DIR is the former spelling of --model DIR\n"
+    assert note in printed.err
 
 
 TRAIN = "train data=good out=OUT"
@@ -248,7 +261,7 @@ TRAIN = "train data=good out=OUT"
         (f"{TRAIN} model=cnn window_samples=100000", "longest stretch"),
         ("train --fast", "no flag '--fast'"),
         ("evaluate model_dir=good", "data is required"),
-        ("evaluate data=good modeldir=x", "did you mean model_dir"),
+        ("evaluate data=good modeldir=x", "--model"),
         ("evaluate data=good x", "not of the form key=value"),
         ("learn", "no command 'learn'"),
     ],
@@ -273,7 +286,7 @@ def test_a_real_folder_that_is_no_data_set(capsys, tmp_path):
     [
         "train data=good",
         "train -m data=good normalise=rms,none",
-        "evaluate data=x model_dir=y",
+        "evaluate data=x --model=y",
     ],
 )
 def test_existing_out_is_refused_before_the_data_is_read(

@@ -156,7 +156,7 @@ def test_the_stored_baseline_repeats_its_scores(stored, capsys):
     model = model_of(out, "by_unit-tooth_logistic-seed0")
     with pytest.MonkeyPatch.context() as patch:
         serve(patch, {"good": dataset})
-        says(capsys, "evaluate", "data=good", f"model_dir={model}", f"out={out / 'e'}")
+        says(capsys, "evaluate", "data=good", f"--model={model}", f"out={out / 'e'}")
     mine = metrics_of(out)["protocols"]["by_unit"]["methods"]["tooth_logistic"]
     assert metrics_of(out / "e")["confusion"] == mine["confusion"]
     assert not list(out.rglob("*.pkl"))

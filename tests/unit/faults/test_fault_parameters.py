@@ -11,7 +11,7 @@ from refusals import refused
 from gensig.errors import ConfigError, FaultError, GensigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import COMPOUND, FAULTS, fault_parts, read_faults
-from gensig.options.compose import options
+from gensig.options.groups import options
 from gensig.systems.pair_machine import severity
 
 CRACK, PIT, MISSING = (

@@ -20,7 +20,8 @@ from gensig.life.root.root_stress import (
     root_width,
     spread_along_face,
 )
-from gensig.options.compose import compose, options
+from gensig.options.compose import compose
+from gensig.options.groups import options
 from gensig.systems.registry import read_pair
 from gensig.systems.root_strength import read_root_strength
 

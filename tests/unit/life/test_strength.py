@@ -15,7 +15,8 @@ from gensig.life.root.strength import (
     safety,
     size_factor,
 )
-from gensig.options.compose import compose, options
+from gensig.options.compose import compose
+from gensig.options.groups import options
 from gensig.units import read
 
 

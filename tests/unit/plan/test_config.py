@@ -10,7 +10,8 @@ from fault_cases import option
 from gensig.errors import ConfigError, GensigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import read_faults
-from gensig.options.compose import _composed, compose, options, override_keys, sweep
+from gensig.options.compose import _composed, compose, override_keys, sweep
+from gensig.options.groups import options
 from gensig.plan.request import DerivedValueWarning, read_request
 from gensig.systems.pair_machine import severity
 from gensig.systems.registry import read_system
@@ -307,41 +308,27 @@ class TestSweeps:
         assert [job[0] for job in sweep([word])] == jobs
 
     def test_a_sweep_is_no_single_request(self):
-        with pytest.raises(ConfigError, match="several values need -m"):
+        with pytest.raises(ConfigError, match="several values, where one is needed"):
             override_keys(["seed=1,2"])
 
     @pytest.mark.parametrize(
         ("word", "instead"),
         [
-            ("operating.torque_nm=55,5", "Then write operating.torque_nm=55.5"),
+            ("operating.torque_nm=55,5", "Then type operating.torque_nm=55.5"),
             (
                 "protocols=by_unit,cross_specimen",
-                "Then write 'protocols=[by_unit,cross_specimen]'",
+                "a list is written 'protocols=[by_unit,cross_specimen]'",
             ),
-            ("plan.classes=healthy,crack", "Then write 'plan.classes=[healthy,crack]'"),
-            ("fault=healthy,crack", None),
-            ("operating.speed_rpm=1000,1500,2000", None),
+            (
+                "plan.classes=healthy,crack",
+                "a list is written 'plan.classes=[healthy,crack]'",
+            ),
         ],
     )
     def test_what_was_perhaps_meant_by_several_values(self, word, instead):
         with pytest.raises(ConfigError) as caught:
             override_keys([word])
-        assert str(caught.value).endswith(
-            instead or "several values need -m (one data set for each)"
-        )
-
-    def test_an_option_of_a_forgotten_folder_is_found(self, tmp_path, monkeypatch):
-        monkeypatch.chdir(tmp_path)
-        file = tmp_path / "configs" / "gear" / "mine.yaml"
-        file.parent.mkdir(parents=True)
-        file.write_text("{}")
-        hint = (
-            r"no option 'mine' of gear; it is in \./configs: add --config-dir configs"
-        )
-        with pytest.raises(ConfigError, match=hint):
-            read_request(["gear=mine"])
-        with pytest.raises(ConfigError, match="no option 'other' of gear; there is"):
-            read_request(["gear=other"])
+        assert instead in str(caught.value)
 
 
 def test_paper_experiment_means_every_convention_of_the_paper_and_no_noise():

@@ -2,8 +2,15 @@
 
 import pytest
 
-from gensig.options.compose import compose, options
-from gensig.plan.request import _fault_option, _typed_words, read_request
+from gensig.options.compose import compose
+from gensig.options.groups import options
+from gensig.plan.request import read_request
+from gensig.plan.sources import OptionFiles
+from gensig.plan.words import typed_words
+
+
+def files_of(words):
+    return OptionFiles(words=typed_words(words), config_dir=None)
 
 
 class TestFaultOptionAlone:
@@ -18,10 +25,8 @@ class TestFaultOptionAlone:
     @pytest.mark.parametrize("fault", options("fault"))
     def test_it_is_that_of_the_whole_configuration(self, fault):
         words = [*self.OTHERS, f"fault={fault}"]
-        assert (
-            _fault_option(_typed_words(words), fault, (), None)
-            == compose("generate", words)["fault"]
-        )
+        whole = compose("generate", words)["fault"]
+        assert files_of(words).fault_option(fault) == whole
 
     @pytest.mark.parametrize("choice", ["plan.classes=[crack]", "fault=crack"])
     def test_a_reference_to_another_group_is_followed(self, choice):
@@ -36,15 +41,15 @@ class TestFaultOptionAlone:
             composed.append(name)
             return compose(name, *args, **kwargs)
 
-        monkeypatch.setattr("gensig.plan.request.compose", counted)
+        monkeypatch.setattr("gensig.plan.sources.compose", counted)
         read_request(["experiment=quickstart", "fault.crack_depth_mm=1.25"])
         assert composed.count("generate") == 1
         assert all(name == "generate" or name.startswith("fault/") for name in composed)
 
     def test_nobody_can_change_what_the_next_one_gets(self):
-        words = _typed_words([])
-        _fault_option(words, "crack", (), None)["vary"].clear()
-        assert _fault_option(words, "crack", (), None)["vary"]
+        files = files_of([])
+        files.fault_option("crack")["vary"].clear()
+        assert files.fault_option("crack")["vary"]
 
     def test_what_an_experiment_sets_of_every_fault_is_kept(self):
         classes = read_request(["experiment=engine_test_point"]).config["classes"]

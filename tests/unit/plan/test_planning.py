@@ -241,8 +241,26 @@ class TestRefusals:
             make_plan(Configuration(config))
 
 
-def test_shards_hold_about_64_mb(config_with):
+@pytest.mark.parametrize(
+    ("n_records", "together"),
+    [(1, 24), (400, 24), (24_000, 24), (24_001, 32), (100_000, 104), (600_000, 600)],
+)
+def test_shards_grow_with_the_set(config_with, n_records, together):
+    assert records_per_shard(config_with(), n_records) == together
+    assert n_records <= 1000 * together
+    given = config_with({"dataset.records_per_shard": 7})
+    assert records_per_shard(given, n_records) == 7
+
+
+@pytest.mark.parametrize("n_records", [400, 10**8])
+def test_a_shard_holds_at_most_500_mb_of_samples(config_with, n_records):
+    long = config_with({"operating.duration_s": 100.0, "dataset.store_clean": True})
     assert record_bytes(config_with()) == 4 * 4 * 51200
-    assert records_per_shard(config_with()) == 80
-    assert records_per_shard(config_with({"dataset.store_clean": True})) == 40
-    assert records_per_shard(config_with({"dataset.records_per_shard": 7})) == 7
+    assert record_bytes(long) == 2 * 100 * 4 * 4 * 51200
+    for config in (config_with(), long):
+        n_bytes = record_bytes(config)
+        together = records_per_shard(config, n_records)
+        assert together * n_bytes <= 5 * 10**8
+        assert together == 24 or (together + 8) * n_bytes > 5 * 10**8
+    million = records_per_shard(config_with(), 10**6)
+    assert 1000 <= 10**6 / million <= 2000

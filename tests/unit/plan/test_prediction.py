@@ -1,11 +1,13 @@
 """Prediction of a data set: counts, and bytes near those that are made."""
 
 import functools
+import re
 
 import pytest
 
 import gensig
 from gensig.errors import SimulationError
+from gensig.plan.make import varied_keys
 from gensig.plan.request import read_request
 from gensig.production.prediction import FailedRecordsWarning, predict
 from gensig.record import inputs as records
@@ -64,6 +66,31 @@ def test_what_a_grid_holds_is_told():
     assert told["design"].startswith(
         "grid of operating.speed_rpm 3; drawn: crack.tooth, crack.crack_depth_mm"
     )
+    line = re.split(" +", told["varies"].splitlines()[0], maxsplit=1)
+    assert line == ["operating.speed_rpm", "1200, 1800, 2400"]
+
+
+def test_every_varied_key_has_a_line_with_its_range():
+    words = ["experiment=many_machines", "fault.crack_depth_mm=1"]
+    config = read_request(words).config
+    varied = varied_keys(config)
+    assert varied["gear.pinion.n_teeth"] == "18 to 60, whole numbers"
+    assert varied["operating.speed_rpm"] == "400 to 3600, logarithmic"
+    assert varied["operating.torque_nm"] == (
+        "10 to 50, logarithmic of unit load, N/mm2"
+    )
+    assert varied["sensing.snr_db"] == "10 to 30"
+    assert "crack.crack_depth_mm" not in varied  # which is given
+    assert varied["fault_gear"].startswith("pinion, wheel; ")
+    assert set(config["plan"]["vary"]) < set(varied)
+
+
+def test_faults_of_lives_grow():
+    config = read_request(["experiment=run_to_failure"]).config
+    varied = varied_keys(config)
+    grown = {name for name, text in varied.items() if text == "grows along each life"}
+    assert grown == set(config["classes"])
+    assert set(varied) - grown == set(config["plan"]["vary"])
 
 
 def test_records_that_fail_while_they_are_timed_are_told(monkeypatch):

@@ -138,9 +138,10 @@ def test_interrupted_set_never_looks_whole(tmp_path, plan, n_shards):
 
 
 def test_folder_that_is_no_datasetting(tmp_path):
-    for path in (tmp_path, tmp_path / "none"):
-        with pytest.raises(DatasetError, match="no gensig data set"):
-            verify(path)
+    with pytest.raises(DatasetError, match="no gensig data set"):
+        verify(tmp_path)
+    with pytest.raises(DatasetError, match="none does not exist"):
+        verify(tmp_path / "none")
     os.mkfifo(tmp_path / "manifest.json")  # must not hang
     with pytest.raises(DatasetError, match="no gensig data set"):
         verify(tmp_path)

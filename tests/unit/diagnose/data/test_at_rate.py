@@ -88,6 +88,6 @@ def test_a_model_at_a_lower_rate_takes_faster_recordings_and_refuses_slower_ones
     words = ["predict", "--model", model, slow]
     refuses(capsys, words, "the model was trained at 6400")
     serve(monkeypatch, {"good": data})
-    text = says(capsys, "evaluate", "data=good", f"model_dir={model}")
+    text = says(capsys, "evaluate", "data=good", f"--model={model}")
     score = metrics["protocols"]["by_unit"]["methods"]["cnn"]["balanced_accuracy"]
     assert f"balanced_accuracy {score['mean']:.3f}" in text

@@ -111,7 +111,7 @@ def test_train_and_evaluate_know_the_channels(crossed, tmp_path, monkeypatch):
 
     def evaluated(*words):
         out = tmp_path / f"judged-{'-'.join(words)}"
-        words = ["data=four", f"model_dir={model}", f"out={out}", *words]
+        words = ["data=four", f"--model={model}", f"out={out}", *words]
         assert main(["evaluate", *words]) == 0
         return metrics_of(out)
 
@@ -138,4 +138,4 @@ def test_evaluate_refuses_channels_that_do_not_fit(
     model, capsys, monkeypatch, word, message
 ):
     serve(monkeypatch, {"four": four()})
-    refuses(capsys, ["evaluate", "data=four", f"model_dir={model}", word], message)
+    refuses(capsys, ["evaluate", "data=four", f"--model={model}", word], message)

@@ -101,7 +101,7 @@ def test_evaluate_repeats_the_score_of_the_network_that_compares(
     compares = model_of(tooth_study, "by_unit-with_reference-seed0")
     with pytest.MonkeyPatch.context() as patch:
         serve(patch, {"good": known_machines})
-        words = ["evaluate", "data=good", f"model_dir={compares}"]
+        words = ["evaluate", "data=good", f"--model={compares}"]
         text = says(capsys, *words)
     methods = metrics_of(tooth_study)["protocols"]["by_unit"]["methods"]
     score = methods["with_reference"]["balanced_accuracy"]["mean"]

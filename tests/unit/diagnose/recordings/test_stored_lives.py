@@ -64,7 +64,7 @@ def test_evaluate_on_its_test_part_repeats_the_report(
 ):
     serve(monkeypatch, {"lives": lives})
     out = tmp_path / "judged"
-    words = ["data=lives", f"model_dir={models[method]}", f"out={out}"]
+    words = ["data=lives", f"--model={models[method]}", f"out={out}"]
     printed = says(capsys, "evaluate", *words)
     result = metrics_of(out)
     reported = metrics_of(life_study)["protocols"]["by_unit"]
@@ -188,7 +188,7 @@ def test_another_data_set_is_judged_whole_and_one_without_lives_or_classes_refus
 ):
     offered = {"other": FakeLives(n_lives=6, seed=5)}
     serve(monkeypatch, offered)
-    words = ["evaluate", "data=other", f"model_dir={models['cnn']}"]
+    words = ["evaluate", "data=other", f"--model={models['cnn']}"]
     printed = says(capsys, *words)
 
     assert "48 records of 6 lives that failed (and 0 censored): all records" in printed
