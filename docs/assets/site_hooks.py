@@ -1,4 +1,4 @@
-"""Hooks of ``mkdocs build``: equations as MathML, and links to files outside ``docs``.
+"""Hooks of ``mkdocs build``: equations as MathML, the notebook, links to files outside ``docs``.
 
 Pages are written for two readers, a code forge and the site. So equations are fenced blocks of
 ``math`` with a ``\\tag``, and links go to files of the repository; here both become something
@@ -16,6 +16,7 @@ from typing import Any
 from latex2mathml.converter import convert
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
+from nbconvert import MarkdownExporter
 from pymdownx.slugs import slugify
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -23,6 +24,7 @@ ROOT_PAGES = {
     name.lower(): name for name in ("CHANGELOG.md", "CONTRIBUTING.md", "THIRD-PARTY.md")
 }  # next to README.md
 SOURCE = "source"  # folder of the site for linked files that are no pages
+NOTEBOOK, TOUR = "tour.ipynb", "tour.md"
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s#]+)(#[^)\s]*)?\)")
 TAG = re.compile(r"\\tag\{([^}]*)\}")
 
@@ -45,12 +47,14 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the pages next to README.md, and every file outside ``docs`` that a page links to."""
+    """Add the pages next to README.md, the notebook, and every file that a page links to."""
     for page, name in ROOT_PAGES.items():
         if (ROOT / name).is_file():
             files.append(
                 File.generated(config, page, content=(ROOT / name).read_text("utf-8"))
             )
+    for file in notebook_page(config):
+        files.append(file)
     linked = set()
     for page in files.documentation_pages():
         linked |= {
@@ -76,14 +80,27 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     def renewed(found: re.Match[str]) -> str:
         text, target, anchor = found.groups(default="")
         here = page.file.src_uri
+        target = target.replace(NOTEBOOK, TOUR)
         path = _path(here, target)
         if path is None or (path.startswith("docs/") and here not in ROOT_PAGES):
-            return found[0]
+            return f"[{text}]({target}{anchor})"
         if (site_path := _site_path(path)) is None:
             return text if path in text else f"{text} (`{path}`)"
         return f"[{text}]({posixpath.relpath(site_path, posixpath.dirname(here) or '.')}{anchor})"
 
     return LINK.sub(renewed, markdown)
+
+
+def notebook_page(config: Any) -> list[File]:
+    """The notebook with its stored outputs as a page, and the pictures in it."""
+    exporter = MarkdownExporter()
+    resources = {"unique_key": "tour", "output_files_dir": "tour_files"}
+    text, made = exporter.from_filename(ROOT / "docs" / NOTEBOOK, resources=resources)
+    pictures = made["outputs"].items()
+    return [
+        File.generated(config, TOUR, content=text),
+        *(File.generated(config, name, content=data) for name, data in pictures),
+    ]
 
 
 def equation(source: str, *_: Any, **__: Any) -> str:

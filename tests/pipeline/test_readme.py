@@ -14,11 +14,10 @@ MAIN = {"gensig": gensig.cli.main, "diagnose": diagnose.cli.main}
 SMALLER = {"plan.n_records=80": ["plan.n_records=24", "executor.n_workers=1"]}
 WRITTEN = (
     "crack.png",
-    "crack.json",
     "missing.png",
     "missing.csv",
-    "twin.png",
-    "runs/report/report.html",
+    "quick.npz",
+    "runs/net/report.html",
 )
 
 
@@ -48,14 +47,24 @@ def test_ten_lines_of_shell(tmp_path, monkeypatch, capsys):
 def test_ten_lines_of_python(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     code = block("Ten lines of Python").split("\n", 1)[1].removesuffix("```")
-    assert len(code.strip().splitlines()) <= 11  # and the empty one
+    lines = [line for line in code.splitlines() if line and "import" not in line]
+    assert len(lines) == 10
     names = {}
     exec(code, names)
     classes = "['healthy', 'crack', 'pitting', 'missing_tooth']"
     assert capsys.readouterr().out.startswith(classes)
-    assert names["signal"].shape == (4, 12800)
-    assert names["train"]
-    assert names["softer"].min() < names["softer"].max()
+    assert names["signals"].shape == (2, 4, 51200)
+    assert names["windows"].shape == (64, 4, 4096)
+    assert names["severity"].shape == (64,)
+
+
+def test_it_is_short_and_narrow():
+    lines = TEXT.splitlines()
+    assert len(lines) <= 100
+    assert max(map(len, lines)) <= 100
+    code = re.findall(r"^```\w+\n(.*?)^```", TEXT, flags=re.DOTALL | re.MULTILINE)
+    assert len(code) == 4
+    assert max(len(line) for text in code for line in text.splitlines()) <= 80
 
 
 def test_the_two_commands_are_those_of_the_makefile():
