@@ -32,7 +32,7 @@ def rows(config):
 
 def simulated(config, rows):
     """Records of rows, one after the other, in a process without any twin."""
-    records._TWINS.clear()
+    records.forget_twins()
     return [simulate_record(config, row) for row in rows]
 
 
@@ -64,7 +64,7 @@ def test_records_are_independent_in_any_order_and_block(config, rows, in_order, 
             block = [rows[index] for index in ORDER[first : first + size]]
             result += simulate_records(config, block)
         assert_same(result, expected)
-        records._TWINS.clear()
+        records.forget_twins()
     assert bits(in_order[5]) != bits(in_order[4])
     assert_same(simulated(config, [rows[5]]), [in_order[5]])
 
@@ -75,7 +75,7 @@ def test_a_failure_leaves_its_block(config, rows, in_order):
         **rows[2],
         "params/operating.drive_frequency_hz": 1e6,
     }
-    records._TWINS.clear()
+    records.forget_twins()
     result = simulate_records(config, [*rows[:2], stiff, rows[3]])
     failed = result.pop(2)
 

@@ -33,7 +33,9 @@ def test_simulate_writes_one_record(gensig, drawn, suffix, tmp_path, capsys):
     assert wave.get_xlabel() == "time, s"
     assert wave.get_ylabel() == "acceleration, m/s$^2$"
     assert spectrum.get_title().endswith("harmonics of the mesh frequency 690.0 Hz")
-    assert len(envelope.lines) == 12  # the spectrum and eleven turns of the pinion
+    assert (
+        len(envelope.lines) == 13
+    )  # with and without the fault, eleven turns of the pinion
     before = file.stat().st_mtime_ns
     assert main(line.split()) == 2
     assert "choose another name, or add --force" in capsys.readouterr().err

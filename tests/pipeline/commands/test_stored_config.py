@@ -6,9 +6,9 @@ from small_sets import TINY, contents
 
 import gensig
 from gensig.cli import main
-from gensig.commands.console import ShardProgress
 from gensig.dataset.folder.layout import read_manifest
 from gensig.dataset.folder.verify import verify
+from gensig.terminal.run_progress import RunProgress
 
 ONE = "executor.n_workers=1"
 
@@ -77,7 +77,7 @@ def test_an_interrupted_set_of_a_stored_configuration_goes_on(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(ShardProgress, "__call__", interrupt)
+        patch.setattr(RunProgress, "__call__", interrupt)
         run(130, "generate", "--quiet", "--config", "first", "out=again")
     (first / "config.yaml").unlink()  # what was begun does not need it
     run(2, "resume", "--quiet", "again", "-j", "1", "seed=5")

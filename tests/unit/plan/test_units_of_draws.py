@@ -28,6 +28,7 @@ NUMBERS = {
     "support_stiffness_scatter",
     "support_damping_scatter",
     "drive_damping_ratio",
+    "speed_tolerance",
     "gain_scatter",
     "tooth",
     "pitted_share",
