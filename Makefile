@@ -9,7 +9,7 @@ DEMO ?= demo
 PYTEST_ARGS ?= -n 2 --dist loadfile --no-loadscope-reorder
 BIN := $(VENV)/bin
 
-.PHONY: demo test check wheel-test docs clean
+.PHONY: demo test check wheel-test docs figures clean
 
 demo: $(VENV)/.installed
 	@test ! -e $(DEMO) || { echo "$(DEMO) exists: remove it, or choose another folder with DEMO=..."; exit 2; }
@@ -27,6 +27,10 @@ wheel-test: $(VENV)/.installed-test
 
 check: $(VENV)/.installed-test
 	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy && $(BIN)/lint-imports
+
+# pictures of the pages, by the commands of docs/figures/commands.txt
+figures: $(VENV)/.installed
+	$(BIN)/python -m tests.figures
 
 docs: $(VENV)/.installed-docs
 	$(BIN)/mkdocs build --strict

@@ -14,6 +14,8 @@ import gensig.cli
 from gensig.errors import ConfigError
 from gensig.options.compose import compose, override_keys, sweep
 from gensig.plan.request import read_request
+from tests import figures
+from tests.screenshots import SHOTS
 
 MAIN = {"gensig": gensig.cli.main, "diagnose": diagnose.cli.main}
 
@@ -92,6 +94,20 @@ def test_commands_of_a_page_can_be_typed(
         except ConfigError as error:
             wrong.append(f"line {line}: {' '.join(words)}: {error}")
     assert not wrong, "\n".join(wrong)
+
+
+def test_every_picture_is_drawn_by_a_command_that_can_be_typed(
+    stopped_after_parsing: None,
+) -> None:
+    drawn = figures.commands()
+    made_otherwise = {"realism_recording.png", "realism_yardstick.png", *SHOTS}
+    files = {
+        str(path.relative_to(figures.FOLDER)) for path in figures.FOLDER.rglob("*.png")
+    }
+    assert drawn.keys() | made_otherwise == files
+    for name, words in drawn.items():
+        _check(words)
+        assert name in words or words[:2] == ["gensig", "figures"]
 
 
 @pytest.mark.parametrize(
