@@ -41,7 +41,22 @@ moved.install()
 
 
 def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> Dataset:
-    """Open the folder of a data set; see ``gensig.dataset.reader``."""
+    """Open the folder of a data set for reading; nothing in it is changed.
+
+    Parameters
+    ----------
+    path : the folder
+    allow_incomplete : opens an interrupted run too; records of missing shards are not ``usable``
+
+    Returns
+    -------
+    Dataset    columns of all records by ``column``, accelerations by ``signals``, records that meet
+               conditions by ``where``, subsets by ``split``
+
+    Raises
+    ------
+    gensig.errors.DatasetError    where the folder is no data set, or is incomplete
+    """
     from gensig.dataset import reader
 
     return reader.open_dataset(path, allow_incomplete=allow_incomplete)
@@ -51,6 +66,15 @@ def load_system(*overrides: str, config_dir: str | Path | None = None) -> Machin
     """The sound machine that overrides describe, as the commands would build it.
 
     For its faults see `load_faults`.
+
+    Parameters
+    ----------
+    overrides : ``group=option`` and ``key=value``, as for ``gensig simulate``
+    config_dir : folder with options of your own; None finds them in ``./configs``
+
+    Raises
+    ------
+    gensig.errors.GensigError    for anything that cannot be used
     """
     from gensig.plan.request import read_request
     from gensig.record.machines import read_machine
@@ -68,6 +92,11 @@ def load_faults(
     >>> curves = gensig.load_system().stiffness_curves(faults)
     >>> bool((curves.faulty_pair_stiffness <= curves.single_pair_stiffness).all())
     True
+
+    Parameters
+    ----------
+    overrides : ``fault=option`` and ``fault.key=value``, as for ``gensig simulate``
+    config_dir : folder with options of your own; None finds them in ``./configs``
 
     Raises
     ------
@@ -93,7 +122,7 @@ def generate(
     ----------
     overrides : ``group=option`` and ``key=value``, as for ``gensig generate``
     out : folder that does not exist or is empty
-    config_dir : folder with options of your own
+    config_dir : folder with options of your own; None finds them in ``./configs``
     workers : processes of this machine; None takes the executor of the overrides, by default a
             process for each core
     progress : shows the records that are made: a bar on a terminal and in notebooks, elsewhere a
@@ -128,6 +157,7 @@ def stream(
     overrides : as for ``gensig generate``; ``out`` and ``executor`` change nothing
     epoch : 0 gives the bits of ``generate``; any other number as many records with new draws,
             units included
+    config_dir : folder with options of your own; None finds them in ``./configs``
 
     Raises
     ------
@@ -157,6 +187,15 @@ def fault_pairs(
     config_dir: str | Path | None = None,
 ) -> FaultPairs:
     """The selected machine with and without its fault over a map of speeds and torques.
+
+    Parameters
+    ----------
+    overrides : ``group=option`` and ``key=value``, with a fault
+    speeds_rpm, torques_nm : axes of the map; None takes shares of the set-point
+    n_units : machines a point, each with manufacturing errors of its own
+    fixed_noise : True takes the noise of the set-point everywhere
+    epoch : draws other machines
+    config_dir : folder with options of your own; None finds them in ``./configs``
 
     Raises
     ------
