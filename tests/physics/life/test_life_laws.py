@@ -134,6 +134,22 @@ def test_the_life_falls_with_the_load_to_the_paris_exponent(law, exponent):
     assert_close(slope, -exponent, 1e-9)
 
 
+@pytest.mark.parametrize("gear", ["pinion", "wheel"])
+def test_a_crack_grows_once_a_mesh_of_its_tooth(machine, crack, options, gear):
+    """A tooth of the pinion meshes once a turn of the pinion, one of the wheel 23 / 84 times."""
+    cracked = replace(crack, gear=gear)
+    growth = options.laws["crack"]
+    law = crack_growth(machine.pair, machine.material, cracked, growth)
+    depth, torque = law.sizes[40::30], 100.0
+    ranges = [law.measures(float(size), torque) for size in depth]
+    intensity = np.array([one["stress_intensity_range_mpa_sqrt_m"] for one in ranges])
+    assert (intensity * 1e6 > growth.threshold).all()
+
+    a_mesh = growth.coefficient * intensity**growth.exponent
+    meshes = machine.pair.pinion.n_teeth / machine.pair.gears[gear].n_teeth
+    assert_close(law.rate(depth, torque), meshes * a_mesh, 1e-9)
+
+
 def test_the_course_converges_with_the_cells(law):
     """Half as many cells move the life by less than 0.1 %."""
     start = law.sizes[20]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.signal import hilbert
 
 from gensig.errors import ConfigError
 from gensig.sensing.accelerometer import LIMITS, Accelerometer, draw_sensors
@@ -60,6 +61,32 @@ def test_mounted_resonance_also_above_half_the_rate(resonance, frequency):
     ratio = frequency / resonance
     exact = 1.0 / abs(1.0 - ratio**2 + 0.04j * ratio)
     assert_allclose(gain(sensor, frequency), exact, rtol=2e-3)
+
+
+@pytest.mark.parametrize("damping", [0.01, 0.05, 0.2, 0.7])
+def test_a_mounted_resonance_is_as_sharp_as_its_damping_says(damping):
+    """At resonance the gain of an oscillator is 1 / (2 zeta)."""
+    sensor = replace(IDEAL, mounted_resonance=12_000.0, resonance_damping_ratio=damping)
+    assert_allclose(gain(sensor, 12_000.0), 0.5 / damping, rtol=2e-3)
+
+
+@pytest.mark.parametrize("damping", [0.005, 0.02])
+def test_a_mounted_resonance_rings_down_as_its_damping_says(damping):
+    """After an impulse the envelope falls as exp(-zeta W t)."""
+    resonance = 4000.0
+    sensor = replace(
+        IDEAL, mounted_resonance=resonance, resonance_damping_ratio=damping
+    )
+    n_settling = round(sensor.memory_of_resonance * RATE)
+    impulse = np.zeros((1, 2 * n_settling))
+    impulse[0, 0] = 1.0
+    envelope = np.abs(hilbert(sensor.filtered(impulse, RATE)[0]))
+    time = np.arange(n_settling // 10, n_settling) / RATE
+    slope, _ = np.polyfit(time, np.log(envelope[n_settling // 10 : n_settling]), 1)
+
+    rate = 2 * np.pi * resonance * damping
+    assert_allclose(slope, -rate, rtol=5e-3)
+    assert_allclose(rate * sensor.memory_of_resonance, 5.0)
 
 
 @pytest.mark.parametrize(

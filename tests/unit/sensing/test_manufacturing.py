@@ -39,6 +39,25 @@ def quality(xiamen):
     return lambda **changes: replace(xiamen.quality, **changes)
 
 
+class EqualDraws:
+    """Draws without chance: no runout, teeth that differ, and 1 for every slope."""
+
+    def uniform(self, low, high, size=None):
+        return high if size is None else np.full(size, high)
+
+    def random(self):
+        return 0.0
+
+    def standard_normal(self, size):
+        return np.cos(np.arange(size) ** 2)
+
+    def choice(self, values):
+        return max(values)
+
+    def integers(self, low, high):
+        return low
+
+
 def draw(pair, quality, seed=0):
     return draw_specimen(
         rng(seed),
@@ -221,6 +240,33 @@ class TestWhatIsDrawn:
             2 * 0.4 * limit,
             rtol=0.1,
         )
+
+    @pytest.mark.parametrize("name", GEARS)
+    def test_a_slope_of_a_tooth_is_drawn_towards_its_own_tip(
+        self, xiamen, quality, name
+    ):
+        """Drawn as 1 for every tooth it is the common slope of sign 1, on either gear."""
+        pair = xiamen.pair
+        of_teeth, common = (
+            draw_specimen(
+                EqualDraws(),
+                pair.pinion,
+                pair.wheel,
+                quality(tooth_share=share, undulation_share=1.0),
+            )
+            for share in (1.0, 0.0)
+        )
+        tooth = faulty_teeth(pair, common.forms)[(name, 0)]
+        at, back = tooth.profile.curvature_radius, tooth.flank_deviation[0]
+        even = np.linspace(at[0], at[-1], 4001)
+        towards_tip = np.polyfit(even, np.interp(even, at, back), 1)[0]
+        # by how much the contact moves towards the tip as it runs along the path
+        begin, end = pair.curvature(name, np.array([0.0, pair.base_pitch]))
+        run = (end - begin) / pair.base_pitch
+
+        assert towards_tip > 0.0
+        tilt = getattr(of_teeth, f"{name}_tilt")
+        assert_allclose(tilt, towards_tip * run, rtol=1e-3)
 
     @pytest.mark.parametrize(
         "share",

@@ -218,9 +218,27 @@ def test_orders_and_sizes_of_a_neighbour(tones_of):
 
     level = 0.01 * 20.0 * 84 / 23 / 29.4e-3
     direction = np.array([0.5, math.sqrt(0.75), 29.4e-3])
-    for order, share in ((25.0, 1.0), (26.0, 0.2), (50.0, 0.5), (51.0, 0.1)):
-        (force,) = tones.force[np.isclose(tones.order, order)]
-        assert_allclose(np.abs(force), share * level * direction)
+    for harmonic, share in ((25.0, 1.0), (50.0, 0.5)):
+        for order, of_line in zip(harmonic + sides, (1.0, *4 * (0.2,)), strict=True):
+            (force,) = tones.force[np.isclose(tones.order, order)]
+            assert_allclose(np.abs(force), of_line * share * level * direction)
+
+
+@pytest.mark.parametrize(
+    ("gear", "turn"),
+    [("pinion", "pinion_rotation"), ("wheel", "wheel_rotation")],
+)
+def test_a_neighbour_turns_a_gear_as_the_set_torque_does(
+    dynamics, tones_of, gear, turn
+):
+    """Its mesh is what drives a driving gear and what holds a driven one back."""
+    tones = tones_of("neighbour_mesh", {"gear": gear})
+    system = dynamics.system()
+    outside = system.force[list(system.names).index(turn)]
+    along = tones.force[:, 0] / math.cos(math.radians(60))
+    arm = tones.force[:, 2] / along
+
+    assert_allclose(arm, np.sign(outside) * 29.4e-3, rtol=1e-9)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -142,6 +142,23 @@ def test_a_mesh_tone_alone_leaves_nothing_to_judge():
         assert np.isnan(OF_ONE_TURN[name](tone, TEETH))
 
 
+@pytest.mark.parametrize("n_harmonics", [1, 2])
+def test_sidebands_count_on_either_side_alike(n_harmonics):
+    lower = {-3: 0.2, -1: 0.5}
+    upper = {2: 0.3, 6: 0.4}
+    mesh = wave(TEETH) + wave(2 * TEETH)
+
+    def ratio(sides):
+        waves = [size * wave(TEETH + step) for step, size in sides.items()]
+        return sideband_ratio(mesh + sum(waves), TEETH, n_harmonics=n_harmonics)
+
+    assert_allclose(ratio(lower), 0.7 / n_harmonics)
+    assert_allclose(ratio(upper), 0.7 / n_harmonics)
+    assert_allclose(ratio(lower | upper), 1.4 / n_harmonics)
+    # one beyond the sixth belongs to no harmonic
+    assert_allclose(ratio({-7: 0.9, 7: 0.9}), 0.0, atol=1e-12)
+
+
 def test_fm0_and_nb4_of_amplitude_modulation():
     depth = 0.4
     turn = (1 + depth * wave(1)) * wave(TEETH)
