@@ -6,7 +6,6 @@ Every mistake is answered by one line.
 from __future__ import annotations
 
 import math
-import stat
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -220,15 +219,14 @@ def _content(file: str, suffix: str, array: str | None) -> Content:
     """Content of a file, from the process that reads it."""
     path = Path(file).expanduser()
     try:
-        facts = path.stat()
-        if stat.S_ISREG(facts.st_mode):
-            path.open("rb").close()
+        n_bytes = path.stat().st_size
+        if not path.is_file() and not path.is_dir():
+            raise ConfigError(f"{file} cannot be read: it is no file; save it as one")
+        path.open("rb").close()
     except OSError as error:
         raise ConfigError(f"{file} cannot be read: {error.strerror}") from None
-    if not stat.S_ISREG(facts.st_mode):
-        raise ConfigError(f"{file} cannot be read: it is no file; give a recording")
     reader = f"{READER_MODULE}:{READERS[suffix]}"
-    return read_apart(reader, file, array, limits_for(facts.st_size))
+    return read_apart(reader, file, array, limits_for(n_bytes))
 
 
 def _table(
