@@ -18,6 +18,7 @@ from typing import Any
 import yaml
 
 from gensig.errors import ConfigError
+from gensig.options.defaults_lists import OptionCounts
 from gensig.options.plain_file import LOADER, check_choice, check_option, option_text
 from gensig.units import split_unit
 
@@ -327,9 +328,14 @@ def user_folder() -> Path | None:
 
 def _find(group: str, option: str, config_dir: str | Path | None) -> _File:
     check_choice(f"{group}/{option}", "the name of an option")
-    for folder in _folders(config_dir):
-        path = folder / group / f"{option}.yaml"
+    package, *own = _folders(config_dir)
+    name = f"{option}.yaml"
+    if (package / group / name).is_file():
+        return _File(package / group / name, package)
+    for folder in own:
+        path = folder / group / name
         if path.is_file():
+            OptionCounts(folder).check(path)
             return _File(path, folder)
     raise ConfigError(f"no option '{option}' of {group}")
 

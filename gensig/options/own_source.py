@@ -12,13 +12,18 @@ from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from gensig.errors import ConfigError
-from gensig.options.plain_file import check_option, option_text
+from gensig.options.defaults_lists import OptionCounts
+from gensig.options.plain_file import HEADER_CHARACTERS
 
 SCHEME = "own-options"
 
 
 class OwnOptionsSource(ConfigSource):
     """Folder of a user's options; a file that is refused raises ConfigError."""
+
+    def __init__(self, provider: str, path: str) -> None:
+        super().__init__(provider, path)
+        self._counts = OptionCounts(Path(self.path))
 
     @staticmethod
     def scheme() -> str:
@@ -30,8 +35,7 @@ class OwnOptionsSource(ConfigSource):
         file = self._file(config_path)
         if not file.exists():
             raise ConfigLoadError(f"Config not found : {file}")
-        text = option_text(file, Path(self.path))
-        check_option(file, text)
+        text = self._counts.check(file)
         try:
             config = OmegaConf.create(text)
         except (yaml.YAMLError, OmegaConfBaseException, ValueError) as error:
@@ -42,7 +46,7 @@ class OwnOptionsSource(ConfigSource):
             config=config,
             path=self.full_path(),
             provider=self.provider,
-            header=ConfigSource._get_header_dict(text[:512]),
+            header=ConfigSource._get_header_dict(text[:HEADER_CHARACTERS]),
         )
 
     def available(self) -> bool:

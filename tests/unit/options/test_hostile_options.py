@@ -186,6 +186,59 @@ def test_a_file_that_is_more_than_values_is_refused(name, folder):
     assert not (folder.parent / "ran").exists()
 
 
+def doubling(folder, entry):
+    """Options that each build on the one before twice."""
+    group = folder / "operating"
+    (group / "b0.yaml").write_text("speed_rpm: 1\n")
+    for n in range(1, 12):
+        entries = f"{entry.format(n=n - 1, key='p')}, {entry.format(n=n - 1, key='q')}"
+        (group / f"b{n}.yaml").write_text(f"defaults: [{entries}]\n")
+
+
+CHAINS = {
+    "twice": ("b{n}@{key}", "builds on more than 100 options"),
+    "twice by a path": ("/operating/b{n}@{key}", "builds on more than 100 options"),
+    "twice by a group": (
+        "{{/operating@{key}: b{n}}}",
+        "builds on more than 100 options",
+    ),
+    "twice, a list": (
+        "{{/operating@{key}: [b{n}]}}",
+        "builds on more than 100 options",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_options_that_build_on_each_other_twice_are_refused(name, folder):
+    entry, message = CHAINS[name]
+    doubling(folder, entry)
+    with refused(message):
+        read_request(["operating=b11"], config_dir=folder)
+    with refused(message):
+        option_keys("operating", "b11", folder)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["[theirs]", "[theirs@a]", "[{/operating@a: theirs}]", "[/operating/theirs@a]"],
+)
+def test_an_option_that_builds_on_itself_is_refused(text, folder):
+    write(folder, f"defaults: {text}\n")
+    with refused("builds on itself"):
+        read_request(["operating=theirs"], config_dir=folder)
+    with refused("builds on itself"):
+        option_keys("operating", "theirs", folder)
+
+
+def test_an_option_of_a_few_others_is_composed(folder):
+    doubling(folder, "b{n}")
+    write(folder, "defaults: [rated, b0, _self_]\ntorque_nm: 3\n")
+    config = read_request(["operating=theirs"], config_dir=folder).config
+    assert config["operating"]["speed_rpm"] == 1
+    assert config["operating"]["torque_nm"] == 3
+
+
 @pytest.mark.parametrize("place", ["mine", "configs"])
 @pytest.mark.parametrize(
     "name", ["mappings of mappings", "an object", "a target", "the environment"]
@@ -368,3 +421,19 @@ def test_shipped_options_are_the_same_from_a_folder_of_a_user(folder):
         shipped = compose("generate", [*words, f"{group}={path.stem}"])
         copied = compose("generate", [*words, f"{group}=copy"], config_dir=folder)
         assert copied.plain() == shipped.plain()
+
+
+@pytest.mark.parametrize("name", ["a, b [c] (d)=e", "früher mine", "a:b"])
+def test_a_folder_may_have_any_plain_name(name, folder):
+    write(folder, "defaults: [rated, _self_]\nspeed_rpm: 600\n")
+    renamed = folder.rename(folder.with_name(name))
+    config = read_request(["operating=theirs"], config_dir=renamed).config
+    assert config["operating"]["speed_rpm"] == 600
+
+
+@pytest.mark.parametrize("name", [HOME, "a'b", "a\\b"])
+def test_a_folder_whose_name_would_be_read_is_refused(name, folder):
+    write(folder, "speed_rpm: 600\n")
+    renamed = folder.rename(folder.with_name(name))
+    with refused("cannot be used; rename it"):
+        read_request(["operating=theirs"], config_dir=renamed)
