@@ -15,6 +15,7 @@ from importlib import resources
 from pathlib import Path
 
 from gensig.errors import ConfigError
+from gensig.text.user_file import check_file
 from gensig.units import UNITS, split_unit, to_si
 
 EDGE_KINDS = ("shaft", "coupling", "rigid", "gear_mesh")
@@ -158,7 +159,9 @@ def _text_of(key: str, file: str) -> str:
     if bare in shipped_tables():
         return str(_tables().joinpath(bare).read_text(encoding="utf-8"))
     try:
-        return Path(file).expanduser().read_text(encoding="utf-8-sig")
+        path = Path(file).expanduser()
+        check_file(f"{key} = {file}", path)
+        return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", "it is no text in UTF-8")
         raise ConfigError(

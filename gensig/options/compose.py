@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from hydra import compose as hydra_compose
-from hydra.core.override_parser.types import Glob, OverrideType, QuotedString
+from hydra.core.override_parser.types import Glob, OverrideType
 from hydra.errors import HydraException
 from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -31,7 +31,11 @@ from gensig.options.groups import (
     group_names,
     options,
     parse,
+    plain_value,
 )
+from gensig.options.own_source import search_path
+from gensig.options.plain_file import check_choice
+from gensig.options.references import check_tree, refuse_references
 from gensig.options.several_values import (
     MOST_ADVISED,
     interval_text,
@@ -69,7 +73,7 @@ def compose(
     ConfigError    for an unknown key or option, a value of the wrong form, or a missing folder
     """
     words = tuple(overrides)
-    if config_dir is None and not any(word.startswith("hydra.") for word in words):
+    if config_dir is None:
         return _packaged(config_name, words)
     return _composed(config_name, words, config_dir)
 
@@ -118,9 +122,24 @@ def _chosen_options(config_name: str, words: tuple[str, ...]) -> DictConfig:
 
 
 def _resolved(config: DictConfig) -> Configuration:
+    """A composition with its references resolved, which may be those to keys alone."""
+    check_references(config)
     values = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
     assert isinstance(values, dict)
+    refuse_references(values, "a composed configuration")
     return Configuration({str(key): value for key, value in values.items()})
+
+
+def check_references(config: DictConfig) -> None:
+    """Refuse a composition whose references must not be resolved.
+
+    Raises
+    ------
+    ConfigError    see `gensig.options.references.check_tree`
+    """
+    tree = OmegaConf.to_container(config, resolve=False)
+    assert isinstance(tree, dict)
+    check_tree({str(key): value for key, value in tree.items()})
 
 
 def composed_groups(
@@ -145,7 +164,7 @@ def _composed(
     config = _hydra_composed(config_name, words, config_dir)
     try:
         return _resolved(config)
-    except (OmegaConfBaseException, ValueError) as error:
+    except (OmegaConfBaseException, ValueError, RecursionError) as error:
         text = _explain(error, config_name, words, config_dir)
         raise ConfigError(text) from None
 
@@ -154,16 +173,23 @@ def _hydra_composed(
     config_name: str, words: tuple[str, ...], config_dir: str | Path | None
 ) -> DictConfig:
     """A composition whose references are not resolved yet."""
+    check_choice(config_name, "the name of an option")
+    parse(words)  # refuses words that Hydra must not see
     searched = list(words)
     if config_dir is not None:
         folder = Path(config_dir).expanduser().resolve()
         if not folder.is_dir():
             raise ConfigError(f"--config-dir {config_dir} is not a folder")
-        searched.append(f"hydra.searchpath=[file://{folder}]")
+        searched.append(search_path(folder))
     with HydraState():
         try:
             return hydra_compose(config_name=config_name, overrides=searched)
-        except (HydraException, OmegaConfBaseException, ValueError) as error:
+        except (
+            HydraException,
+            OmegaConfBaseException,
+            ValueError,
+            RecursionError,
+        ) as error:
             text = _explain(error, config_name, words, config_dir)
             raise ConfigError(text) from None
 
@@ -253,7 +279,7 @@ def override_keys(overrides: Sequence[str]) -> dict[str, str]:
         value = override.value()
         if isinstance(value, list):
             default = _default(key, overrides)[1]
-            if text := list_text(key, line, _plain(value), default):
+            if text := list_text(key, line, plain_value(value), default):
                 raise ConfigError(text)
         keys[key] = override.get_value_element_as_str()
     return keys
@@ -271,7 +297,7 @@ def _several_values(
         values = _swept(override, None)
     else:
         items = _sweep_values(override, override.sweep_iterator, MOST_ADVISED + 1)
-        values = [_plain(item) for item in items]
+        values = [plain_value(item) for item in items]
     primary, default = _default(key, overrides)
     return several_values_text(key, line, values, default, primary)
 
@@ -315,17 +341,8 @@ def typed_mapping(overrides: Sequence[str], key: str) -> dict[str, Any]:
             raise ConfigError(
                 f"{key} must be a mapping, for instance '{key}={{name: value}}'"
             )
-        result.update({str(name): _plain(item) for name, item in value.items()})
+        result.update({str(name): plain_value(item) for name, item in value.items()})
     return result
-
-
-def _plain(value: Any) -> Any:
-    """Hydra's quoted strings and nested values as plain Python."""
-    if isinstance(value, dict):
-        return {str(name): _plain(item) for name, item in value.items()}
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    return str(value) if isinstance(value, QuotedString) else value
 
 
 def _explain(

@@ -18,6 +18,8 @@ from typing import Any
 import yaml
 
 from gensig.errors import ConfigError
+from gensig.options.defaults_lists import OptionCounts
+from gensig.options.plain_file import LOADER, check_choice, check_option, option_text
 from gensig.units import split_unit
 
 PRIMARY = ("generate", "train")
@@ -48,7 +50,6 @@ WRITTEN = {
 }
 SENTENCE_END = re.compile(r"(?<!\bal)(?<!\beq)\.\s+(?=[A-Z<0-9]|docs/)")
 EXPONENT = re.compile(r"[-+]?[0-9.]+[eE][-+]?[0-9]+")
-LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,18 +102,15 @@ class _Default:
 class _File:
     """One configuration file: its tree with positions, and its lines for the comments."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, folder: Path) -> None:
         self.path = path
-        self.source = path.read_text(encoding="utf-8")
+        self.source = option_text(path, folder)
         self.lines = self.source.splitlines()
 
     @cached_property
     def tree(self) -> Any:
-        try:
-            return yaml.compose(self.source, Loader=LOADER)
-        except yaml.YAMLError as error:
-            text = " ".join(str(error).split())
-            raise ConfigError(f"{self.path} is no YAML: {text}") from None
+        check_option(self.path, self.source)
+        return yaml.compose(self.source, Loader=LOADER)
 
     @property
     def is_global(self) -> bool:
@@ -233,13 +231,14 @@ def groups(config_dir: str | Path | None = None) -> list[Group]:
 
 def options(group: str, config_dir: str | Path | None = None) -> list[Option]:
     """The options of a group; the package's precede a user's of the same name, as in Hydra."""
-    files: dict[str, Path] = {}
+    files: dict[str, _File] = {}
     for folder in _folders(config_dir):
         for path in (folder / group).glob("*.yaml"):
-            files.setdefault(path.stem, path)
+            if path.stem not in files:
+                files[path.stem] = _File(path, folder)
     return [
-        Option(name=name, about=_File(path).about(), file=path)
-        for name, path in sorted(files.items())
+        Option(name=name, about=file.about(), file=file.path)
+        for name, file in sorted(files.items())
     ]
 
 
@@ -328,16 +327,23 @@ def user_folder() -> Path | None:
 
 
 def _find(group: str, option: str, config_dir: str | Path | None) -> _File:
-    for folder in _folders(config_dir):
-        path = folder / group / f"{option}.yaml"
+    check_choice(f"{group}/{option}", "the name of an option")
+    package, *own = _folders(config_dir)
+    name = f"{option}.yaml"
+    if (package / group / name).is_file():
+        return _File(package / group / name, package)
+    for folder in own:
+        path = folder / group / name
         if path.is_file():
-            return _File(path)
+            OptionCounts(folder).check(path)
+            return _File(path, folder)
     raise ConfigError(f"no option '{option}' of {group}")
 
 
 @lru_cache(maxsize=len(PRIMARY))
 def _primary(name: str) -> _File:
-    return _File(_folders(None)[0] / f"{name}.yaml")
+    folder = _folders(None)[0]
+    return _File(folder / f"{name}.yaml", folder)
 
 
 def _folders(config_dir: str | Path | None) -> list[Path]:
@@ -363,7 +369,10 @@ def _value(node: Any) -> Any:
         return {key.value: _value(inner) for key, inner in node.value}
     if isinstance(node, yaml.SequenceNode):
         return [_value(inner) for inner in node.value]
-    value = yaml.safe_load(yaml.serialize(node))
+    try:
+        value = yaml.safe_load(yaml.serialize(node))
+    except ValueError:  # a date of no calendar, a number with too many digits
+        return node.value
     is_plain_text = isinstance(value, str) and not node.style
     if is_plain_text and EXPONENT.fullmatch(value):
         return float(value)

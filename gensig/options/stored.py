@@ -12,10 +12,14 @@ from omegaconf.errors import OmegaConfBaseException
 
 from gensig.errors import ConfigError
 from gensig.options import files as option_files
-from gensig.options.compose import composed_groups, dotted_keys, nearest_key
+from gensig.options.compose import (
+    check_references,
+    composed_groups,
+    dotted_keys,
+    nearest_key,
+)
 from gensig.options.groups import group_names, parse
-
-INTERPOLATION = "${"
+from gensig.options.references import refuse_references
 
 
 def changed_content(
@@ -41,7 +45,7 @@ def changed_content(
     ------
     ConfigError    for an unknown key or option, and for overrides of another form
     """
-    _refuse_references(content)
+    refuse_references(content, "a stored configuration")
     chosen: dict[str, str] = {}
     words, changes = [], []
     for word, override in zip(overrides, parse(overrides), strict=True):
@@ -65,6 +69,7 @@ def changed_content(
         except OmegaConfBaseException:
             near = nearest_key(key, dotted_keys(dict(content)))
             raise ConfigError(f"unknown key '{key}'{near}") from None
+    check_references(config)
     try:
         result = OmegaConf.to_container(config, resolve=True)
     except OmegaConfBaseException as error:
@@ -73,6 +78,7 @@ def changed_content(
             f"a stored configuration cannot be changed so: {text}"
         ) from None
     assert isinstance(result, dict)
+    refuse_references(result, "a stored configuration")
     return {
         str(key): value
         for key, value in result.items()
@@ -108,17 +114,3 @@ def _at(tree: Mapping[str, Any], dotted: str) -> Any:
     for name in dotted.split("."):
         node = node.get(name) if isinstance(node, Mapping) else None
     return node
-
-
-def _refuse_references(value: Any) -> None:
-    """Raise ConfigError for a text that would be read as a reference to another value."""
-    if isinstance(value, Mapping):
-        for item in value.values():
-            _refuse_references(item)
-    elif isinstance(value, list | tuple):
-        for item in value:
-            _refuse_references(item)
-    elif isinstance(value, str) and INTERPOLATION in value:
-        raise ConfigError(
-            f"a stored configuration holds values, not references: '{value}'"
-        )

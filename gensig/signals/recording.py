@@ -6,7 +6,7 @@ Every mistake is answered by one line.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,15 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
-from gensig.signals.recording_files import (
-    Content,
-    read_hdf5,
-    read_mat,
-    read_npy,
-    read_npz,
-    read_wav,
-)
-from gensig.text.user_file import check_rate, read_table
+from gensig.signals.reading.reader_process import limits_for, read_apart
+from gensig.signals.reading.recording_files import LEAST_SAMPLES, Content
+from gensig.text.user_file import check_rate
 
 Array = NDArray[np.float64]
 
@@ -42,16 +36,18 @@ WRONG_SUFFIXES = (
     "_nm",
     "_deg",
 )
-READERS: dict[str, Callable[[str, str | None], Content]] = {
-    ".npy": read_npy,
-    ".npz": read_npz,
-    ".wav": read_wav,
-    ".h5": read_hdf5,
-    ".hdf5": read_hdf5,
-    ".mat": read_mat,
+READER_MODULE = "gensig.signals.reading.recording_files"
+# type of a file -> function of that module, which another process calls
+READERS = {
+    ".csv": "read_csv",
+    ".npy": "read_npy",
+    ".npz": "read_npz",
+    ".wav": "read_wav",
+    ".h5": "read_hdf5",
+    ".hdf5": "read_hdf5",
+    ".mat": "read_mat",
 }
-TYPES = (".csv", *READERS)
-LEAST_SAMPLES = 256
+TYPES = tuple(READERS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,25 +127,9 @@ def read_file(
             f"{file}: the name must end in {', '.join(TYPES)}; "
             "write the recording as one of these"
         )
-    if suffix == ".csv":
-        if array is not None:
-            raise ConfigError(
-                f"{file}: --array is for .npz, .h5, .hdf5 and .mat; leave it out"
-            )
-        names, values, rate = _read_csv(file, rate, rate_option)
-        return RecordingFile(
-            file=file,
-            channels=tuple(names),
-            named=True,
-            values=values,
-            sampling_rate=rate,
-            has_level=True,
-        )
-    try:
-        Path(file).expanduser().open("rb").close()
-    except OSError as error:
-        raise ConfigError(f"{file} cannot be read: {error.strerror}") from None
-    content = READERS[suffix](file, array)
+    content = _content(file, suffix, array)
+    if content.names is not None:
+        return _table(file, content.names, content.values, rate, rate_option)
     stored = content.sampling_rate
     _check_range(
         stored, f"{file}: {content.rate_from} has {stored} samples a second, which"
@@ -235,16 +215,52 @@ def without_unit(name: str) -> str:
     return name
 
 
-def _read_csv(
-    file: str, rate: float | None, rate_option: str
-) -> tuple[list[str], Array, float]:
-    names, values = read_table("recording", file, least_rows=LEAST_SAMPLES)
-    if "time_s" not in names:
-        if rate is None:
-            raise ConfigError(
-                f"{file}: it has no column time_s; give the samples a second with {rate_option}"
-            )
-        return names, values, rate
+def _content(file: str, suffix: str, array: str | None) -> Content:
+    """Content of a file, from the process that reads it."""
+    path = Path(file).expanduser()
+    try:
+        n_bytes = path.stat().st_size
+        if not path.is_file() and not path.is_dir():
+            raise ConfigError(f"{file} cannot be read: it is no file; save it as one")
+        path.open("rb").close()
+    except OSError as error:
+        raise ConfigError(f"{file} cannot be read: {error.strerror}") from None
+    reader = f"{READER_MODULE}:{READERS[suffix]}"
+    return read_apart(reader, file, array, limits_for(n_bytes))
+
+
+def _table(
+    file: str,
+    names: tuple[str, ...],
+    values: Array,
+    rate: float | None,
+    rate_option: str,
+) -> RecordingFile:
+    """Columns of a table as channels, with the rate of its times or the given one."""
+    if "time_s" in names:
+        names, values, rate = _timed(file, names, values, rate, rate_option)
+    if rate is None:
+        raise ConfigError(
+            f"{file}: it has no column time_s; give the samples a second with {rate_option}"
+        )
+    return RecordingFile(
+        file=file,
+        channels=names,
+        named=True,
+        values=values,
+        sampling_rate=rate,
+        has_level=True,
+    )
+
+
+def _timed(
+    file: str,
+    names: tuple[str, ...],
+    values: Array,
+    rate: float | None,
+    rate_option: str,
+) -> tuple[tuple[str, ...], Array, float]:
+    """Names and values of the columns beside the time, and the rate."""
     time = values[names.index("time_s")]
     mean = math.nan
     if time[-1] > time[0]:
@@ -262,7 +278,7 @@ def _read_csv(
         rate = mean
         if math.isclose(mean, round(mean), rel_tol=2e-6):
             rate = float(round(mean))
-    return [names[index] for index in kept], values[kept], rate
+    return tuple(names[index] for index in kept), values[kept], rate
 
 
 def _check_agreement(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import math
+import stat
 from pathlib import Path
 from typing import TextIO
 
@@ -31,10 +32,7 @@ def read_table(key: str, file: str, *, least_rows: int) -> tuple[list[str], Arra
     path = Path(file).expanduser()
     where = f"{key} = {file}"
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise ConfigError(
-                f"{where} is larger than {MOST_BYTES // 1_000_000} MB; cut it"
-            )
+        check_file(where, path)
         with path.open(newline="", encoding="utf-8-sig") as stream:
             names = _header(where, stream)
             values = np.loadtxt(stream, delimiter=",", ndmin=2, dtype=np.float64)
@@ -60,6 +58,27 @@ def read_table(key: str, file: str, *, least_rows: int) -> tuple[list[str], Arra
             f"{where}: row {row + 2}, column {names[column]} is no finite number"
         )
     return names, np.ascontiguousarray(values.T)
+
+
+def check_file(where: str, path: Path) -> None:
+    """Refuse what has no end, such as a device, and a file that is too large.
+
+    Parameters
+    ----------
+    where : the key and the file, in messages
+    path : the file
+
+    Raises
+    ------
+    ConfigError    for anything but a file of moderate size; OSError for a file that is not there
+    """
+    facts = path.stat()
+    if not stat.S_ISREG(facts.st_mode) and not path.is_dir():
+        raise ConfigError(f"{where} cannot be read: it is no file; save it as one")
+    if facts.st_size > MOST_BYTES:
+        raise ConfigError(
+            f"{where} is larger than {MOST_BYTES // 1_000_000} MB; cut it"
+        )
 
 
 def _header(where: str, stream: TextIO) -> list[str]:

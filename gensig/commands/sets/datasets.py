@@ -9,16 +9,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import yaml
-
 from gensig.commands.console import note, remark, step
 from gensig.commands.sets.jobs import Job, read_jobs, typed_words
 from gensig.dataset.folder.beginning import config_text, refuse_used
 from gensig.dataset.folder.failures import commonest, failure_reasons
 from gensig.dataset.folder.joining import joined_folder
-from gensig.dataset.folder.layout import CONFIG_BYTES_LIMIT, MANIFEST, OVERRIDES
+from gensig.dataset.folder.layout import MANIFEST, read_overrides
 from gensig.dataset.folder.manifest import read_manifest
-from gensig.dataset.storage.atomic import read_text
 from gensig.errors import ConfigError, Interrupted
 from gensig.options.compose import override_keys
 from gensig.options.configuration import Configuration
@@ -180,10 +177,7 @@ def _asked(
     if not words:
         return None
     keys = {_key(word) for word in words}
-    content = yaml.safe_load(read_text(out / OVERRIDES, limit=CONFIG_BYTES_LIMIT))
-    recorded = []
-    if isinstance(content, list):
-        recorded = [str(word) for word in content]
+    recorded = read_overrides(out)
     kept = [word for word in recorded if not _is_free(word) and _key(word) not in keys]
     try:
         if recorded and recorded[0].startswith(STORED_FLAG):

@@ -265,17 +265,36 @@ def read_config(folder: Path) -> ConfigContent:
 
 def read_config_file(path: Path) -> ConfigContent:
     """A configuration as plain data, see `read_config`."""
+    content = _read_plain(path)
+    if not isinstance(content, dict):
+        raise DatasetError(f"{path} is no mapping; restore it from a copy")
+    return content
+
+
+def read_overrides(folder: Path) -> list[str]:
+    """The overrides of a data set as they were typed.
+
+    DatasetError when `overrides.yaml` is anything but a list of texts.
+    """
+    path = Path(folder) / OVERRIDES
+    content = _read_plain(path)
+    if not isinstance(content, list) or not all(
+        isinstance(word, str) for word in content
+    ):
+        raise DatasetError(f"{path} is no list of texts; restore it from a copy")
+    return content
+
+
+def _read_plain(path: Path) -> Any:
+    """Content of a YAML file without tags, aliases and deep nesting."""
     text = read_text(path, limit=CONFIG_BYTES_LIMIT)
     try:
         _refuse_yaml_bombs(text, path)
-        content = yaml.load(text, Loader=LOADER)
+        return yaml.load(text, Loader=LOADER)
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         raise DatasetError(
             f"{path} is no plain YAML ({str(error).splitlines()[0][:80]}); restore it from a copy"
         ) from error
-    if not isinstance(content, dict):
-        raise DatasetError(f"{path} is no mapping; restore it from a copy")
-    return content
 
 
 def _refuse_yaml_bombs(text: str, path: Path) -> None:

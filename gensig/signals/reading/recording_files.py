@@ -1,10 +1,12 @@
-"""Files of recordings: WAV, numpy, HDF5 and MATLAB.
+"""Files of recordings: tables, WAV, numpy, HDF5 and MATLAB.
 
-Numbers only: nothing is unpickled, no link is followed.
+Numbers only: nothing is unpickled, no link is followed, and no header is believed. Each reader
+runs in a process of its own, see `gensig.signals.reading.reader_process`.
 """
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -16,17 +18,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
-from gensig.text.user_file import MOST_BYTES
+from gensig.signals.reading.promised_sizes import (
+    check_decoded,
+    check_held,
+    check_mat,
+    check_mat_elements,
+    check_npy,
+    check_wav,
+)
+from gensig.text.user_file import read_table
 
 Array = NDArray[np.float64]
 
 ARRAY_KEY = "acceleration"
 RATE_KEY = "sampling_rate_hz"
+LEAST_SAMPLES = 256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
-    """Content of a file without column names.
+    """Content of a file.
 
     Attributes
     ----------
@@ -34,12 +45,22 @@ class Content:
     sampling_rate : Hz    None where the file does not tell
     rate_from : its source, in words
     has_level : False for samples of whole numbers without a unit
+    names : of the columns of a table; None for other files
     """
 
     values: Array
     sampling_rate: float | None
     rate_from: str = RATE_KEY
     has_level: bool = True
+    names: tuple[str, ...] | None = None
+
+
+def read_csv(file: str, array: str | None) -> Content:
+    """Columns of a table, the time among them."""
+    _no_array_name(file, array)
+    names, values = read_table("recording", file, least_rows=LEAST_SAMPLES)
+    check_decoded(file, values.size)
+    return Content(values=values, sampling_rate=None, names=tuple(names))
 
 
 def read_wav(file: str, array: str | None) -> Content:
@@ -50,6 +71,7 @@ def read_wav(file: str, array: str | None) -> Content:
     with _one_line(file, "it is no WAV file"), warnings.catch_warnings():
         # chunks that are no samples
         warnings.simplefilter("ignore", wavfile.WavFileWarning)
+        check_wav(file)
         rate, samples = wavfile.read(Path(file).expanduser())
     rows = np.atleast_2d(np.asarray(samples).T).astype(np.float64)
     return Content(
@@ -64,9 +86,10 @@ def read_npy(file: str, array: str | None) -> Content:
     """The array of a .npy file."""
     _no_array_name(file, array)
     with _one_line(file, "it is no plain array of numbers of numpy"):
-        content = np.load(Path(file).expanduser(), allow_pickle=False)
-        if not isinstance(content, np.ndarray):
-            raise ValueError
+        path = Path(file).expanduser()
+        with path.open("rb") as stream:
+            check_npy(file, stream, path.stat().st_size)
+        content = np.load(path, allow_pickle=False)
     return Content(values=_rows(file, content), sampling_rate=None)
 
 
@@ -78,6 +101,8 @@ def read_npz(file: str, array: str | None) -> Content:
             raise ValueError
         with content:
             name = _chosen(file, array, content.files)
+            for key in (name, RATE_KEY):
+                _check_member(file, content, key)
             values, rate = content[name], content.get(RATE_KEY)
     return Content(values=_rows(file, values), sampling_rate=_rate(file, rate))
 
@@ -102,14 +127,12 @@ def read_hdf5(file: str, array: str | None, *, from_matlab: bool = False) -> Con
         # visits the items of the file alone: neither soft nor external links
         content.visititems(keep)
         chosen = arrays[_chosen(file, array, arrays)]
-        if 8 * chosen.size > MOST_BYTES:
-            raise ConfigError(
-                f"{file}: {chosen.name} is larger than {MOST_BYTES // 1_000_000} MB; cut it"
-            )
+        _check_stored(file, chosen)
         values = chosen[()]
         rates: list[Mapping[str, Any]] = [chosen.attrs, content.attrs]
         rate = next((group[RATE_KEY] for group in rates if RATE_KEY in group), None)
         if rate is None and RATE_KEY in arrays:
+            _check_stored(file, arrays[RATE_KEY])
             rate = arrays[RATE_KEY][()]
     return Content(
         values=_rows(file, values, from_matlab=from_matlab),
@@ -129,7 +152,10 @@ def read_mat(file: str, array: str | None) -> Content:
     if h5py.is_hdf5(path):
         return read_hdf5(file, array, from_matlab=True)
     with _one_line(file, "it is no MATLAB file"):
-        name = _chosen(file, array, [row[0] for row in io.whosmat(path)])
+        check_mat_elements(file)
+        shapes = {row[0]: row[1] for row in io.whosmat(path)}
+        name = _chosen(file, array, list(shapes))
+        check_mat(file, shapes, name, RATE_KEY)
         content = io.loadmat(path, variable_names=[name, RATE_KEY])
     return Content(
         values=_rows(file, content[name], from_matlab=True),
@@ -142,7 +168,7 @@ def _one_line(file: str, what: str) -> Iterator[None]:
     """Turn what a reader raises on a damaged file into one line; a ConfigError passes."""
     try:
         yield
-    except ConfigError:
+    except (ConfigError, MemoryError):
         raise
     except OSError as error:
         reason = what
@@ -152,6 +178,31 @@ def _one_line(file: str, what: str) -> Iterator[None]:
     # the parsers of scipy and h5py raise nearly any on bytes that were made to mislead them
     except Exception:
         raise ConfigError(f"{file} cannot be read: {what}") from None
+
+
+def _check_member(file: str, content: np.lib.npyio.NpzFile, key: str) -> None:
+    """Check the size that an array of a .npz file promises, where it has this array."""
+    archive = content.zip
+    assert archive is not None
+    names = archive.namelist()
+    member = f"{key}.npy"
+    if member not in names:
+        member = key
+    if member not in names:
+        return
+    with archive.open(member) as stream:
+        check_npy(file, stream, archive.getinfo(member).file_size, key)
+
+
+def _check_stored(file: str, dataset: Any) -> None:
+    """Check the size that an array of an HDF5 file promises, and that of its chunks."""
+    check_decoded(file, dataset.size, dataset.name)
+    if dataset.chunks is not None:
+        check_decoded(file, math.prod(dataset.chunks), f"a chunk of {dataset.name}")
+    begin = dataset.id.get_offset()
+    if begin is not None:
+        n_bytes = Path(file).expanduser().stat().st_size
+        check_held(file, dataset.size * dataset.dtype.itemsize, n_bytes - begin)
 
 
 def _is_plain(item: Any) -> bool:
