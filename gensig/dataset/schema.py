@@ -222,6 +222,8 @@ REQUIRED = (
     "torque_nm",
     "status",
 )
+# root attributes that tie a shard to its data set: its identity, and the shard's number from 0
+IDENTITY, SHARD_INDEX = "identity", "shard_index"
 REQUIRED_ATTRIBUTES = (
     "schema_version",
     "sampling_rate_hz",

@@ -14,6 +14,7 @@ from gensig.dataset.schema import (
     SCALES,
     known_column,
 )
+from gensig.dataset.storage.atomic import link_text
 from gensig.dataset.storage.attributes import HDF5_ERRORS, decoded, read_attributes
 from gensig.dataset.storage.compression import (
     BLOSC2_CHUNK_LIMIT,
@@ -54,12 +55,13 @@ def open_file(path: Path) -> h5py.File:
 def open_shard(path: Path, *, folder: Path | None = None) -> h5py.File:
     """A shard, open for reading after `check_shard`.
 
-    With `folder`, refused when the name leads out of that folder.
+    With `folder`, refused when the file or a folder above it, up to that one, is a link.
     """
-    if folder is not None and not path.resolve().is_relative_to(folder.resolve()):
-        raise DatasetError(
-            f"{path} is a link that leads out of {folder}; put the file itself there"
-        )
+    if folder is not None:
+        above = [part for part in path.parents if part.is_relative_to(folder)]
+        for part in (path, *above[:-1]):
+            if part.is_symlink():
+                raise DatasetError(link_text(part))
     file = open_file(path)
     try:
         check_shard(file, path)

@@ -11,6 +11,7 @@ from gensig.dataset.folder.layout import (
     Manifest,
     shard_path,
 )
+from gensig.dataset.schema import SHARD_INDEX
 from gensig.dataset.storage.attributes import (
     read_attributes,
     set_attribute,
@@ -31,7 +32,9 @@ def write_index(folder: Path, manifest: Manifest) -> str:
         open_shard(shard_path(folder, 0), folder=folder) as first,
         MemoryFile() as index,
     ):
-        for name, value in read_attributes(first).items():
+        attributes = read_attributes(first)
+        attributes.pop(SHARD_INDEX, None)
+        for name, value in attributes.items():
             set_attribute(index, name, value)
         for name, data in datasets(first, path).items():
             _map(index, name, data, manifest)
