@@ -189,20 +189,30 @@ def build(
     clean=False,
     twin=False,
     figures=False,
+    labelled=False,
+    seed=7,
     **storage,
 ):
-    """A data-set folder; fewer shards or close=False make an interrupted one."""
-    identity = identity_hash(CONFIG, "0.1.0")
+    """A data-set folder; fewer shards or close=False make an interrupted one.
+
+    With ``labelled``, shards name their data set and number, as gensig writes them; without, they
+    are those of an older version.
+    """
+    config = CONFIG | {"seed": seed}
+    identity = identity_hash(config, "0.1.0")
     create_folder(
         out,
-        config=CONFIG,
-        overrides=["seed=7"],
+        config=config,
+        overrides=[f"seed={seed}"],
         plan=plan,
         identity=identity,
-        seed=7,
+        seed=seed,
         generator_version="0.1.0",
     )
     for shard in shards if shards is not None else range(plan.n_shards):
+        if labelled:
+            label = {"identity": identity, "shard_index": shard}
+            storage["attributes"] = ATTRIBUTES | label
         writer = write_shard(
             shard_path(out, shard),
             plan,
