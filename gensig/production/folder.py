@@ -143,6 +143,9 @@ def _join(out: Path, asked: Configuration | None, *, closes: bool) -> None:
     joined_folder(out, asked=plain)
     if closes:
         collect_receipts(out)
+        manifest = read_manifest(out)
+        if not manifest.is_complete:
+            require_tables(out, manifest)
 
 
 def _run_shards(

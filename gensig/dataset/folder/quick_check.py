@@ -1,5 +1,6 @@
 """Checks of a data set that read no record: names, sizes, and what a shard says of itself."""
 
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -80,9 +81,13 @@ def shard_sizes(folder: Path, manifest: Manifest) -> list[str]:
 
 def size_problem(path: Path, entry: ShardEntry) -> str:
     """One line on a shard that is missing or has another size than recorded; '' for none."""
-    if not path.is_file():
+    try:
+        status = path.stat()
+    except OSError:
         return f"{entry.name} is missing"
-    size = path.stat().st_size
+    if not stat.S_ISREG(status.st_mode):
+        return f"{entry.name} is no ordinary file"
+    size = status.st_size
     if size == entry.bytes:
         return ""
     state = "truncated" if size < entry.bytes else "not the recorded file"
@@ -92,7 +97,7 @@ def size_problem(path: Path, entry: ShardEntry) -> str:
 def label_problem(attributes: Mapping[str, Any], manifest: Manifest, index: int) -> str:
     """One line on root attributes that are not those of a shard of this set; '' for none.
 
-    Shards made before gensig 0.15 say neither their number nor their data set.
+    Shards of older sets say neither their number nor their data set.
 
     Parameters
     ----------
