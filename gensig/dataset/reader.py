@@ -16,7 +16,7 @@ from gensig.dataset.folder.layout import (
 from gensig.dataset.folder.quick_check import check_opening
 from gensig.dataset.folder.verify import damage
 from gensig.dataset.plan import Plan, read_plan
-from gensig.dataset.schema import SCALES, SHARD_INDEX, bulk_signals, signal_column
+from gensig.dataset.schema import SCALES, bulk_signals, signal_column
 from gensig.dataset.selection import (
     Records,
     Selection,
@@ -125,7 +125,6 @@ class Dataset:
         self._plan: Plan | None = None
         first = self._shards.open(done[0])
         self.attributes: dict[str, Any] = read_attributes(first)
-        self.attributes.pop(SHARD_INDEX, None)
         self.sampling_rate = float(self.attributes["sampling_rate_hz"])
         self.channel_names: list[str] = list(self.attributes["channel_names"])
         self.class_names: list[str] = list(self.attributes["class_names"])

@@ -12,12 +12,13 @@ from gensig.dataset.folder.layout import PLAN, Manifest, shard_path
 from gensig.dataset.folder.quick_check import label_problem, size_problem
 from gensig.dataset.plan import PlanRows
 from gensig.dataset.schema import IDENTITY
-from gensig.dataset.storage.attributes import HDF5_ERRORS, decoded, read_attributes
+from gensig.dataset.storage.attributes import HDF5_ERRORS, decoded
 from gensig.dataset.storage.guard import (
     first_line,
     open_file,
     open_shard,
     same_file,
+    shard_labels,
 )
 from gensig.errors import DatasetError
 
@@ -90,10 +91,10 @@ class ShardFiles:
 
     def _problem(self, file: h5py.File, shard: int) -> str:
         """The reason why a shard is not the one of the manifest and the plan; '' for none."""
-        attributes = read_attributes(file)
-        if problem := label_problem(attributes, self.manifest, shard):
+        labels = shard_labels(file)
+        if problem := label_problem(labels, self.manifest, shard):
             return f"it {problem}"
-        labelled = IDENTITY in attributes
+        labelled = IDENTITY in labels
         if self._labelled not in (None, labelled):
             return "it was made by another version than the other shards"
         self._labelled = labelled

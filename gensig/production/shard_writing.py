@@ -20,7 +20,7 @@ from gensig.dataset.folder.layout import (
     shard_path,
 )
 from gensig.dataset.plan import PlanRows
-from gensig.dataset.schema import IDENTITY, SHARD_INDEX
+from gensig.dataset.schema import IDENTITY
 from gensig.dataset.storage.guard import same_file
 from gensig.dataset.storage.receipts import (
     write_receipt,
@@ -80,9 +80,13 @@ def write_shard(
         for name in plan.names
         if name.startswith("params/")
     ]
-    origin = {IDENTITY: manifest.identity, SHARD_INDEX: shard_index}
     writer = open_shard(
-        shard_path(out, shard_index), config, n_records, params, origin=origin
+        shard_path(out, shard_index),
+        config,
+        n_records,
+        params,
+        identity=manifest.identity,
+        shard_index=shard_index,
     )
     together = block_length(config)
     with writer, _compilation_told(counts):
@@ -148,7 +152,8 @@ def open_shard(
     n_records: int,
     params: Sequence[str],
     *,
-    origin: Mapping[str, Any] | None = None,
+    identity: str | None = None,
+    shard_index: int | None = None,
 ) -> ShardWriter:
     """Writer for records of one configuration.
 
@@ -158,16 +163,20 @@ def open_shard(
     config : decides signals, columns and attributes
     n_records : rows of the shard
     params : names of the columns ``params/<name>``
-    origin : root attributes that tie the shard to a data set; None for records of none
+    identity, shard_index : data set and number of the shard; None for records of no data set
     """
     system, dataset = read_machine(config), read_dataset_options(config)
     plan = read_plan_options(config)
+    attributes = root_attributes(config, system)
+    if identity is not None:
+        attributes[IDENTITY] = identity
     return ShardWriter(
         path,
         n_records=n_records,
         signals=signal_shapes(config, system),
         params=params,
-        attributes=root_attributes(config, system) | dict(origin or {}),
+        attributes=attributes,
+        shard_index=shard_index,
         compression=dataset.compression,
         sample_type=dataset.sample_type,
         lives=runs_to_failure(config),

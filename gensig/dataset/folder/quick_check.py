@@ -94,29 +94,29 @@ def size_problem(path: Path, entry: ShardEntry) -> str:
     return f"{entry.name} is {state}: {size} bytes, recorded are {entry.bytes}"
 
 
-def label_problem(attributes: Mapping[str, Any], manifest: Manifest, index: int) -> str:
-    """One line on root attributes that are not those of a shard of this set; '' for none.
+def label_problem(labels: Mapping[str, Any], manifest: Manifest, index: int) -> str:
+    """One line on labels that are not those of a shard of this set; '' for none.
 
     Shards of older sets say neither their number nor their data set.
 
     Parameters
     ----------
-    attributes : root attributes of the shard
+    labels : root attributes of the shard, and its number as `SHARD_INDEX`
     manifest : manifest of the data set
     index : number of the shard by its name
     """
-    version = attributes["schema_version"]
+    version = labels["schema_version"]
     if version != manifest.schema_version:
         return (
             f"has format version {version}, the manifest says {manifest.schema_version}"
         )
-    identity = attributes.get(IDENTITY, manifest.identity)
+    identity = labels.get(IDENTITY, manifest.identity)
     if identity != manifest.identity:
         return (
             f"is of another data set: its identity is {str(identity)[:12]!a}, the manifest "
             f"says '{manifest.identity[:12]}'"
         )
-    number = attributes.get(SHARD_INDEX, index)
+    number = labels.get(SHARD_INDEX, index)
     if number != index:
         return f"is swapped: it says that it is shard {str(number)[:12]}"
     return ""

@@ -25,13 +25,19 @@ from gensig.dataset.folder.quick_check import (
     unlisted_files,
 )
 from gensig.dataset.plan import Plan, read_plan
-from gensig.dataset.schema import SCALES, SHARD_INDEX
+from gensig.dataset.schema import SCALES
 from gensig.dataset.splitting.split_check import split_problems
 from gensig.dataset.splitting.splits import read_split
 from gensig.dataset.storage.atomic import sha256_file
 from gensig.dataset.storage.attributes import HDF5_ERRORS, read_attributes
 from gensig.dataset.storage.checksums import differences
-from gensig.dataset.storage.guard import datasets, first_line, open_shard, read_rows
+from gensig.dataset.storage.guard import (
+    datasets,
+    first_line,
+    open_shard,
+    read_rows,
+    shard_labels,
+)
 from gensig.dataset.storage.quantization import is_scale, read_signal
 from gensig.errors import DatasetError
 
@@ -251,9 +257,7 @@ def _description(file: h5py.File, path: Path) -> dict:
         name: (str(data.dtype), data.shape[1:])
         for name, data in datasets(file, path).items()
     }
-    attributes = read_attributes(file)
-    attributes.pop(SHARD_INDEX, None)
-    return {"data sets": shapes, "attributes": attributes}
+    return {"data sets": shapes, "attributes": read_attributes(file)}
 
 
 def _description_differs(file: h5py.File, path: Path, reference: dict) -> list[str]:
@@ -276,7 +280,7 @@ def _description_differs(file: h5py.File, path: Path, reference: dict) -> list[s
 def _label_differs(
     file: h5py.File, entry: ShardEntry, manifest: Manifest, index: int
 ) -> list[str]:
-    problem = label_problem(read_attributes(file), manifest, index)
+    problem = label_problem(shard_labels(file), manifest, index)
     if problem:
         return [f"{entry.name} {problem}"]
     return []

@@ -12,6 +12,7 @@ from gensig.dataset.schema import (
     REQUIRED_ATTRIBUTES,
     SAMPLE_TYPES,
     SCALES,
+    SHARD_INDEX,
     known_column,
 )
 from gensig.dataset.storage.atomic import link_text
@@ -267,6 +268,16 @@ def _check_attributes(file: h5py.File, path: Path) -> None:
     )
     if n_names != n_channels:
         raise DatasetError(f"{path}: {n_names} channel names for {n_channels} channels")
+
+
+def shard_labels(file: h5py.File) -> dict:
+    """Root attributes of a shard, and its number as `SHARD_INDEX` where it says that."""
+    labels = read_attributes(file)
+    labels.pop(SHARD_INDEX, None)
+    number = read_attributes(file["record_id"]).get(SHARD_INDEX)
+    if number is not None:
+        labels[SHARD_INDEX] = number
+    return labels
 
 
 def read_rows(data: h5py.Dataset) -> np.ndarray:

@@ -11,7 +11,6 @@ from gensig.dataset.folder.layout import (
     Manifest,
     shard_path,
 )
-from gensig.dataset.schema import SHARD_INDEX
 from gensig.dataset.storage.attributes import (
     read_attributes,
     set_attribute,
@@ -32,9 +31,7 @@ def write_index(folder: Path, manifest: Manifest) -> str:
         open_shard(shard_path(folder, 0), folder=folder) as first,
         MemoryFile() as index,
     ):
-        attributes = read_attributes(first)
-        attributes.pop(SHARD_INDEX, None)
-        for name, value in attributes.items():
+        for name, value in read_attributes(first).items():
             set_attribute(index, name, value)
         for name, data in datasets(first, path).items():
             _map(index, name, data, manifest)

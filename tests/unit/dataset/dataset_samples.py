@@ -211,8 +211,8 @@ def build(
     )
     for shard in shards if shards is not None else range(plan.n_shards):
         if labelled:
-            label = {"identity": identity, "shard_index": shard}
-            storage["attributes"] = ATTRIBUTES | label
+            storage["attributes"] = ATTRIBUTES | {"identity": identity}
+            storage["shard_index"] = shard
         writer = write_shard(
             shard_path(out, shard),
             plan,

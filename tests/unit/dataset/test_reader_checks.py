@@ -11,6 +11,7 @@ from numpy.testing import assert_array_equal
 from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.reader import open_dataset
+from gensig.dataset.storage.attributes import read_attributes
 from gensig.errors import DatasetError
 
 PLAN = make_plan(n_records=40)  # four shards of one size
@@ -52,7 +53,6 @@ def test_a_whole_set_is_read_in_every_way(folder):
     for check in ("quick", "full"):
         with open_dataset(folder, check=check) as data:
             assert_array_equal(data.column("record_id"), PLAN.columns["record_id"])
-            assert "shard_index" not in data.attributes
 
 
 def test_another_check_is_refused(folder):
@@ -90,23 +90,26 @@ def test_a_shard_of_another_set_is_noticed_on_the_first_read(new_folder, tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "text"),
+    ("part", "name", "value", "text"),
     [
-        ("schema_version", 2, "has format version 2, the manifest says 1"),
-        ("identity", "0" * 64, "is of another data set"),
-        ("shard_index", 0, "is swapped: it says that it is shard 0"),
+        ("/", "schema_version", 2, "has format version 2, the manifest says 1"),
+        ("/", "identity", "0" * 64, "is of another data set"),
+        ("record_id", "shard_index", 0, "is swapped: it says that it is shard 0"),
     ],
 )
 def test_foreign_labels_are_noticed_though_every_digest_fits(
-    new_folder, name, value, text
+    new_folder, part, name, value, text
 ):
-    assert text in forge(new_folder, 2, lambda file: file.attrs.modify(name, value))
+    def relabel(file):
+        file[part].attrs.modify(name, value)
+
+    assert text in forge(new_folder, 2, relabel)
     assert text in refused(new_folder, 25)
 
 
 def test_a_shard_without_a_label_among_others_that_have_one_is_refused(new_folder):
     def unlabel(file):
-        del file.attrs["identity"], file.attrs["shard_index"]
+        del file.attrs["identity"], file["record_id"].attrs["shard_index"]
 
     forge(new_folder, 2, unlabel)
     assert "another version than the other shards" in refused(new_folder, 25)
@@ -198,9 +201,15 @@ def test_the_full_check_of_an_interrupted_set_looks_at_what_is_made(tmp_path):
         open_dataset(folder, **options)
 
 
-def test_the_index_has_the_identity_and_no_number_of_a_shard(new_folder):
-    with h5py.File(new_folder / "index.h5") as index:
-        assert "shard_index" not in index.attrs
-        with open_dataset(new_folder) as data:
-            assert index.attrs["identity"].decode() == data.manifest.identity
+def test_root_attributes_are_the_same_in_all_shards_and_the_index(new_folder):
+    """What older versions of gensig verify; the number of a shard is elsewhere."""
+    paths = [shard_path(new_folder, index) for index in range(4)]
+    with open_dataset(new_folder) as data:
+        attributes, identity = data.attributes, data.manifest.identity
+    assert attributes["identity"] == identity
+    for number, path in enumerate([*paths, new_folder / "index.h5"]):
+        with h5py.File(path, locking=False) as file:
+            assert read_attributes(file) == attributes
+            stored = file["record_id"].attrs.get("shard_index")
+            assert stored == (None if path.name == "index.h5" else number)
     assert verify(new_folder).problems == []
