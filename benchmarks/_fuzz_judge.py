@@ -31,16 +31,22 @@ MEMORY_LIMIT = 400 * 1024**2  # bytes a mutant may add; the sets are far below 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """One mutant: ``fault`` is empty where gensig behaved, else what it did."""
+    """One mutant: ``fault`` is empty where gensig behaved, else what it did.
+
+    ``noticed``: something refused or named the change; ``refused``: a reader did, before verify.
+    """
 
     seed: int
     kind: str
     fault: str
     noticed: bool
+    refused: bool
 
 
-def judge(folder: Path, mutant: Mutant, whole: dict[str, Any]) -> tuple[str, bool]:
-    """The fault ('' for none), and whether anything refused or named the change."""
+def judge(
+    folder: Path, mutant: Mutant, whole: dict[str, Any]
+) -> tuple[str, bool, bool]:
+    """The fault ('' for none), whether anything noticed the change, whether a reader refused."""
     lines: list[str] = []
     faults: list[str] = []
 
@@ -72,7 +78,7 @@ def judge(folder: Path, mutant: Mutant, whole: dict[str, Any]) -> tuple[str, boo
     noticed = bool(lines) or not checked
     if not noticed and not mutant.forged and _meaning(folder) != whole:
         faults.append("accepted in silence")
-    return "; ".join(faults), noticed
+    return "; ".join(faults), noticed, not read
 
 
 def _read_all(folder: Path) -> None:
@@ -114,13 +120,13 @@ def _work(template: Path, scratch: Path, seeds: range, pipe: Connection) -> None
         folder = scratch / f"mutant-{seed}" / "set"
         shutil.copytree(template, folder)
         mutant = mutate(folder, seed)
-        pipe.send((seed, mutant.kind, None, False))
+        pipe.send((seed, mutant.kind, None, False, False))
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        fault, noticed = judge(folder, mutant, whole)
+        fault, noticed, refused = judge(folder, mutant, whole)
         grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024
         if grown > MEMORY_LIMIT:
             fault += f"; took {grown} bytes of memory"
-        pipe.send((seed, mutant.kind, fault, noticed))
+        pipe.send((seed, mutant.kind, fault, noticed, refused))
         shutil.rmtree(folder.parent)
 
 
@@ -141,11 +147,17 @@ def verdicts(template: Path, scratch: Path, seeds: range) -> Iterator[Verdict]:
                 if not here.poll(TIME_LIMIT):
                     fault = f"hung for {TIME_LIMIT:g} s"
                     break
-                seed, kind, outcome, noticed = here.recv()
+                seed, kind, outcome, noticed, refused = here.recv()
             except EOFError:
                 break
             if outcome is not None:
-                yield Verdict(seed=seed, kind=kind, fault=outcome, noticed=noticed)
+                yield Verdict(
+                    seed=seed,
+                    kind=kind,
+                    fault=outcome,
+                    noticed=noticed,
+                    refused=refused,
+                )
                 seeds = range(seed + 1, seeds.stop)
                 if not len(seeds):
                     worker.join()
@@ -153,5 +165,7 @@ def verdicts(template: Path, scratch: Path, seeds: range) -> Iterator[Verdict]:
         worker.kill()
         worker.join()
         fault = fault if fault != "died" else f"died, exit status {worker.exitcode}"
-        yield Verdict(seed=seeds[0], kind=kind, fault=fault, noticed=False)
+        yield Verdict(
+            seed=seeds[0], kind=kind, fault=fault, noticed=False, refused=False
+        )
         seeds = range(seeds[0] + 1, seeds.stop)

@@ -23,6 +23,7 @@ from gensig.dynamics.backends.group_run import GroupRun
 from gensig.dynamics.decimation import Decimator, decimator
 from gensig.dynamics.pair import PairDynamics
 from gensig.production import folder as generation
+from gensig.production import shard_writing
 from gensig.record import simulate as records
 from gensig.record.inputs import InputReader
 from gensig.systems import pair_machine, spur_pair
@@ -45,7 +46,7 @@ CLOSING = (
 )
 STAGES = (PLAN, TABLES, EQUATIONS, *INTEGRATION, LOW_PASS, NOISE, WRITING, OTHER)
 CLOCKED: tuple[tuple[Any, str, str], ...] = (
-    (generation, "_folder_inputs", PLAN),
+    (shard_writing, "_folder_inputs", PLAN),
     (InputReader, "inputs", PLAN),
     (spur_pair, "_mesh_table", TABLES),
     (pair_machine, "pair_dynamics", EQUATIONS),
@@ -57,7 +58,7 @@ CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (GroupRun, "record", RECORDING),
     (pair_machine, "checks", CHECKING),
     (records, "_record", NOISE),
-    (generation, "open_shard", WRITING),
+    (shard_writing, "open_shard", WRITING),
     (ShardWriter, "__enter__", WRITING),
     (ShardWriter, "write", WRITING),
     (ShardWriter, "__exit__", WRITING),

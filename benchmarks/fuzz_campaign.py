@@ -49,8 +49,11 @@ def main() -> int:
             gensig.generate(*OVERRIDES, out=template).close()
         seeds = range(arguments.first, arguments.first + arguments.mutants)
         harmful, noticed = [], collections.Counter[bool]()
+        only_verify = collections.Counter[str]()
         for verdict in verdicts(template, Path(scratch), seeds):
             noticed[verdict.noticed] += 1
+            if verdict.noticed and not verdict.refused:
+                only_verify[verdict.kind] += 1
             if verdict.fault:
                 harmful.append(verdict)
                 print(
@@ -66,6 +69,8 @@ def main() -> int:
         "mutants": len(seeds),
         "harmful": len(harmful),
         "noticed": noticed[True],
+        "noticed_by_verify_only": only_verify.total(),
+        "kinds_noticed_by_verify_only": dict(only_verify.most_common()),
         "harmless": noticed[False] - sum(not verdict.noticed for verdict in harmful),
         "seconds": round(time.monotonic() - begin, 1),
         "versions": {

@@ -27,7 +27,8 @@ from gensig.execution.local import LocalExecutor
 from gensig.faults.registry import read_faults
 from gensig.mesh.load_distribution import sound_load
 from gensig.plan.request import read_request
-from gensig.production.folder import begin_folder, run_folder, write_shard
+from gensig.production.folder import begin_folder, run_folder
+from gensig.production.shard_writing import write_shard
 from gensig.systems import spur_pair
 from gensig.systems.base import simulate_together
 from gensig.systems.pair_machine import pair_dynamics

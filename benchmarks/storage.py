@@ -23,15 +23,17 @@ from typing import Any
 import h5py
 import numpy as np
 
+from gensig.dataset.folder.closing import finalize
 from gensig.dataset.folder.layout import shard_path
-from gensig.dataset.folder.manifest import finalize, record_shard
+from gensig.dataset.folder.manifest import record_shard
 from gensig.dataset.reader import open_dataset
 from gensig.dataset.schema import SAMPLE_TYPES
 from gensig.dataset.storage.compression import COMPRESSIONS
 from gensig.options.configuration import Configuration
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.production.folder import begin_folder, open_shard
+from gensig.production.folder import begin_folder
+from gensig.production.shard_writing import open_shard
 from gensig.record.simulate import Record, simulate_records
 
 N_SIMULATED = 16

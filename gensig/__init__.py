@@ -40,13 +40,19 @@ __all__ = [
 moved.install()
 
 
-def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> Dataset:
+def open_dataset(
+    path: str | Path, *, allow_incomplete: bool = False, check: str = "quick"
+) -> Dataset:
     """Open the folder of a data set for reading; nothing in it is changed.
 
     Parameters
     ----------
     path : the folder
     allow_incomplete : opens an interrupted run too; records of missing shards are not ``usable``
+    check : ``quick`` compares names, sizes, the manifest and the plan on opening, and looks at
+            each shard before its first record is read; ``full`` reads and compares every byte
+            first, as ``gensig verify`` does. ``gensig.dataset.reader`` says which damage is
+            noticed when
 
     Returns
     -------
@@ -55,11 +61,12 @@ def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> Dataset
 
     Raises
     ------
-    gensig.errors.DatasetError    where the folder is no data set, or is incomplete
+    gensig.errors.DatasetError    for a folder that is no data set, is damaged as far as that is
+            checked, or is incomplete
     """
     from gensig.dataset import reader
 
-    return reader.open_dataset(path, allow_incomplete=allow_incomplete)
+    return reader.open_dataset(path, allow_incomplete=allow_incomplete, check=check)
 
 
 def load_system(*overrides: str, config_dir: str | Path | None = None) -> Machine:

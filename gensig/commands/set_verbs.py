@@ -191,7 +191,7 @@ SET_VERBS = {
         arguments=NEW_GEARBOX,
     ),
     "resume": Verb(
-        summary="finish an interrupted data set",
+        summary="finish an interrupted data set, or make again what one has lost",
         examples=(
             "gensig resume runs/quickstart",
             "gensig resume runs/quickstart executor=dask executor.n_workers=4",

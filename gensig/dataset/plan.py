@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gensig.dataset.columns import COLUMNS, IS_REFERENCE
 from gensig.dataset.schema import kind_of
-from gensig.dataset.storage.atomic import read_text
+from gensig.dataset.storage.atomic import read_text, require_digest
 from gensig.errors import DatasetError
 
 PLAN_BYTES_LIMIT = 4 * 1024**3
@@ -211,9 +211,14 @@ def plan_text(plan: Plan) -> str:
     return buffer.getvalue()
 
 
-def read_plan(path: Path) -> Plan:
-    """Read `plan.csv`; DatasetError names the file and what is wrong with it."""
+def read_plan(path: Path, *, sha256: str | None = None) -> Plan:
+    """Read `plan.csv`; DatasetError names the file and what is wrong with it.
+
+    With ``sha256``, a file of another digest is refused.
+    """
     text = read_text(path, limit=PLAN_BYTES_LIMIT)
+    if sha256 is not None:
+        require_digest(path, text, sha256)
     try:
         header, *rows = csv.reader(io.StringIO(text, newline=""), strict=True)
     except (csv.Error, ValueError) as error:
@@ -259,6 +264,8 @@ class PlanRows:
             raise DatasetError(
                 f"{path} cannot be read: {error}; check its permissions"
             ) from error
+        if not len(lengths):
+            raise DatasetError(f"{path} is empty; restore it from a copy")
         self._begins = np.concatenate([[0], np.cumsum(lengths)])
         self.names = next(self._cells(0, 1), [])
 

@@ -1,12 +1,9 @@
 """Reading a data set: columns of all records, and the signals of one record at a time."""
 
-import os
-from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 
 from gensig.dataset.columns import GEAR_NAMES, GEAR_TEETH, IS_REFERENCE
@@ -15,8 +12,9 @@ from gensig.dataset.folder.layout import (
     SPLITS,
     Manifest,
     read_manifest,
-    shard_path,
 )
+from gensig.dataset.folder.quick_check import check_opening
+from gensig.dataset.folder.verify import damage
 from gensig.dataset.plan import Plan, read_plan
 from gensig.dataset.schema import SCALES, bulk_signals, signal_column
 from gensig.dataset.selection import (
@@ -27,6 +25,7 @@ from gensig.dataset.selection import (
     structured,
     unknown_name,
 )
+from gensig.dataset.shard_files import ShardFiles
 from gensig.dataset.splitting.protocols import NEW_MACHINE, PROTOCOLS, why_left_out
 from gensig.dataset.splitting.splits import SUBSETS, SplitTable, read_split
 from gensig.dataset.storage.attributes import HDF5_ERRORS, read_attributes
@@ -34,10 +33,7 @@ from gensig.dataset.storage.compression import compression_of
 from gensig.dataset.storage.guard import (
     datasets,
     first_line,
-    open_file,
-    open_shard,
     read_rows,
-    same_file,
 )
 from gensig.dataset.storage.quantization import read_signal
 from gensig.errors import DatasetError
@@ -45,25 +41,42 @@ from gensig.errors import DatasetError
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-MAX_OPEN_SHARDS = 64
+CHECKS = ("quick", "full")
 PAIR_GEARS = ("pinion", "wheel")  # gears of a set that names none
 
 SplitRows = dict[str, list[tuple[int, float, float]]]
 
 
-def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> "Dataset":
+def open_dataset(
+    path: str | Path, *, allow_incomplete: bool = False, check: str = "quick"
+) -> "Dataset":
     """Open a data-set folder for reading; nothing is loaded yet, nothing in the folder is changed.
+
+    Damage is noticed at three moments, with ``check="quick"``:
+
+    - on opening: symbolic links; a manifest other than `SHA256SUMS` says; a plan other than the
+      manifest says; finished shards that are missing or have another size;
+    - when a shard is first read, and again after it changed: a damaged HDF5 structure, another
+      format version, shard number, identity or number of rows, a first record other than the
+      plan says; when a split is read: one other than the manifest says;
+    - only by ``check="full"`` and `gensig verify`: changed bytes inside a shard of the right
+      size, and changes of files that this reader does not read.
 
     Parameters
     ----------
     path : str | Path           the folder
     allow_incomplete : bool     open an interrupted run too; records of missing shards are not
                                 `usable`
+    check : str                 'quick', or 'full': every byte is read and compared first, as
+                                `gensig verify` does
 
     Raises
     ------
-    DatasetError    when the folder is no data set, or is incomplete and that was not allowed
+    DatasetError    when the folder is no data set, is damaged as far as that is checked, or is
+                    incomplete and that was not allowed; for another ``check``
     """
+    if check not in CHECKS:
+        raise DatasetError(f"check={check!r}; allowed are {', '.join(CHECKS)}")
     folder = Path(path)
     manifest = read_manifest(folder)
     if not manifest.is_complete and not allow_incomplete:
@@ -71,6 +84,11 @@ def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> "Datase
             f"{folder} is incomplete: {manifest.n_done} of {len(manifest.shards)} shards are "
             f"done; run `gensig resume {folder}`, or open it with allow_incomplete=True"
         )
+    check_opening(folder, manifest)
+    if check == "full" and (problems := damage(folder, manifest)):
+        n_more = len(problems) - 1
+        more = f" and {n_more} more" if n_more else ""
+        raise DatasetError(f"{folder} is NOT whole: {problems[0]}{more}")
     return Dataset(folder, manifest)
 
 
@@ -97,7 +115,7 @@ class Dataset:
         self.folder = folder
         self.manifest = manifest
         self.n_records = manifest.n_records
-        self._starts = np.cumsum([0, *(entry.rows for entry in manifest.shards)])
+        self._shards = ShardFiles(folder, manifest)
         done = [i for i, entry in enumerate(manifest.shards) if entry.state == "done"]
         if not done:
             raise DatasetError(
@@ -105,17 +123,8 @@ class Dataset:
             )
         self._columns: dict[str, np.ndarray] = {}
         self._plan: Plan | None = None
-        self._files: OrderedDict[int, h5py.File] = OrderedDict()
-        self._checked: dict[int, tuple[int, ...]] = {}
-        self._pid = os.getpid()
-        first = self._file(done[0])
+        first = self._shards.open(done[0])
         self.attributes: dict[str, Any] = read_attributes(first)
-        version = self.attributes["schema_version"]
-        if version != manifest.schema_version:
-            raise DatasetError(
-                f"{folder}: the shards have format version {version}, the manifest says "
-                f"{manifest.schema_version}; run `gensig verify {folder}`"
-            )
         self.sampling_rate = float(self.attributes["sampling_rate_hz"])
         self.channel_names: list[str] = list(self.attributes["channel_names"])
         self.class_names: list[str] = list(self.attributes["class_names"])
@@ -183,7 +192,7 @@ class Dataset:
     def plan(self) -> Plan:
         """The plan, read once."""
         if self._plan is None:
-            self._plan = read_plan(self.folder / PLAN)
+            self._plan = read_plan(self.folder / PLAN, sha256=self.manifest.files[PLAN])
             if self._plan.n_records != self.n_records:
                 raise DatasetError(
                     f"{self.folder}: the plan has {self._plan.n_records} records, the manifest "
@@ -228,16 +237,16 @@ class Dataset:
             kind = None if dtype.kind == "S" else dtype
             return np.full((entry.rows, *shape), missing, dtype=kind)
         try:
-            values = read_rows(self._file(shard)[name])
+            values = read_rows(self._shards.open(shard)[name])
         except HDF5_ERRORS as error:
-            raise self._unreadable(shard, first_line(error)) from error
+            raise self._shards.unreadable(shard, first_line(error)) from error
         if values.shape[1:] != shape:
             raise self._another_shape(shard, name)
         return values
 
     def first_record(self, shard: int) -> int:
         """Number of the record in row 0 of a shard."""
-        return int(self._starts[shard])
+        return int(self._shards.starts[shard])
 
     def signals(
         self,
@@ -292,11 +301,11 @@ class Dataset:
         if name not in known:
             raise unknown_name("signal", name, known, self.folder)
         shard, row, stop = self._position(record_index, start, stop)
-        file = self._file(shard)
+        file = self._shards.open(shard)
         try:
             block = read_signal(file, name, row, start, stop)
         except HDF5_ERRORS as error:
-            raise self._unreadable(shard, first_line(error)) from error
+            raise self._shards.unreadable(shard, first_line(error)) from error
         if block.shape != (len(self.channel_names), stop - start):
             raise self._another_shape(shard, name)
         if channels is None:
@@ -317,9 +326,9 @@ class Dataset:
             raise unknown_name("trace", name, traces or ["none"], self.folder)
         shard, row, stop = self._position(record_index, start, stop)
         try:
-            values = self._file(shard)[name][row, ..., start:stop]
+            values = self._shards.open(shard)[name][row, ..., start:stop]
         except HDF5_ERRORS as error:
-            raise self._unreadable(shard, first_line(error)) from error
+            raise self._shards.unreadable(shard, first_line(error)) from error
         n_axes = len(signal_column(name).axes)
         if values.shape[-1:] != (stop - start,) or values.ndim != n_axes:
             raise self._another_shape(shard, name)
@@ -342,7 +351,9 @@ class Dataset:
             raise DatasetError(
                 f"samples {start} to {stop}; a record has 0 to {self.n_samples}"
             )
-        shard = int(np.searchsorted(self._starts, record_index, side="right")) - 1
+        shard = (
+            int(np.searchsorted(self._shards.starts, record_index, side="right")) - 1
+        )
         entry = self.manifest.shards[shard]
         if entry.state != "done":
             raise DatasetError(
@@ -393,7 +404,8 @@ class Dataset:
                         and for a file that is no split table
         """
         if protocol in self.protocols:
-            return read_split(self.folder / SPLITS / f"{protocol}.csv")
+            name = f"{SPLITS}/{protocol}.csv"
+            return read_split(self.folder / name, sha256=self.manifest.files[name])
         if protocol in PROTOCOLS:
             raise DatasetError(
                 f"split {protocol!r} does not exist in {self.folder}; {self.left_out[protocol]}"
@@ -421,10 +433,7 @@ class Dataset:
 
     def close(self) -> None:
         """Close the files; they open again when needed."""
-        files, self._files = self._files, OrderedDict()
-        if self._pid == os.getpid():
-            for file in files.values():
-                file.close()
+        self._shards.close()
 
     def __enter__(self) -> "Dataset":
         return self
@@ -441,43 +450,9 @@ class Dataset:
     def __iter__(self) -> Iterator[StoredRecord]:
         return iter(self.where())
 
-    def __getstate__(self) -> dict[str, Any]:
-        # another process checks for itself: that is also what makes HDF5 know the filters there
-        return {**self.__dict__, "_files": OrderedDict(), "_checked": {}}
-
     def __repr__(self) -> str:
         folder, n_records = str(self.folder), self.n_records
         return f"Dataset({folder!r}, {n_records} records, classes {self.class_names})"
-
-    def _file(self, shard: int) -> h5py.File:
-        """The open shard.
-
-        At most `MAX_OPEN_SHARDS` stay open, and none is shared with a forked process.
-        """
-        if self._pid != os.getpid():
-            self._files, self._pid = OrderedDict(), os.getpid()
-        if shard in self._files:
-            self._files.move_to_end(shard)
-            return self._files[shard]
-        file = self._open(shard_path(self.folder, shard), shard)
-        if file["record_id"].shape[0] != self.manifest.shards[shard].rows:
-            file.close()
-            reason = "another number of rows than the manifest says"
-            raise self._unreadable(shard, reason)
-        self._files[shard] = file
-        if len(self._files) > MAX_OPEN_SHARDS:
-            self._files.popitem(last=False)[1].close()
-        return file
-
-    def _open(self, path: Path, shard: int) -> h5py.File:
-        """Open a shard; one that was checked and has not changed since is not checked again."""
-        if shard in self._checked and self._checked[shard] == same_file(path):
-            return open_file(path)
-        before = same_file(path)
-        file = open_shard(path, folder=self.folder)
-        if before == same_file(path):
-            self._checked[shard] = before
-        return file
 
     def _channel(self, channel: int | str) -> int:
         if channel in self.channel_names:
@@ -490,10 +465,4 @@ class Dataset:
 
     def _another_shape(self, shard: int, name: str) -> DatasetError:
         reason = f"{name} has another shape than in the other shards"
-        return self._unreadable(shard, reason)
-
-    def _unreadable(self, shard: int, reason: str) -> DatasetError:
-        return DatasetError(
-            f"{shard_path(self.folder, shard)} cannot be read ({reason}); run `gensig verify "
-            f"{self.folder}`"
-        )
+        return self._shards.unreadable(shard, reason)

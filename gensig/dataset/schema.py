@@ -222,6 +222,9 @@ REQUIRED = (
     "torque_nm",
     "status",
 )
+# What ties a shard to its data set: a root attribute, and an attribute of the data set record_id,
+# the number of the shard from 0. Root attributes are the same in all shards.
+IDENTITY, SHARD_INDEX = "identity", "shard_index"
 REQUIRED_ATTRIBUTES = (
     "schema_version",
     "sampling_rate_hz",

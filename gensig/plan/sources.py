@@ -161,7 +161,8 @@ def read_stored(path: str | Path) -> dict[str, Any]:
     ConfigError    for a file that is none
     """
     file = Path(path).expanduser()
-    if file.is_dir():
+    is_folder = file.is_dir()
+    if is_folder:
         file /= CONFIG
     if not file.exists():
         raise ConfigError(
@@ -169,7 +170,7 @@ def read_stored(path: str | Path) -> dict[str, Any]:
             "gensig plan --show-config prints"
         )
     try:
-        content = read_config_file(file)
+        content = read_config_file(file, follow_links=not is_folder)
     except DatasetError as error:
         raise ConfigError(f"--config {error}") from None
     if not isinstance(content.get(CLASSES), dict):

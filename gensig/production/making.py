@@ -8,6 +8,7 @@ from pathlib import Path
 
 from gensig.dataset.folder.joining import joined_folder
 from gensig.dataset.folder.layout import MANIFEST, read_manifest
+from gensig.dataset.folder.quick_check import absences
 from gensig.errors import ConfigError, SimulationError
 from gensig.execution.base import Executor, read_n_workers
 from gensig.execution.local import LocalExecutor
@@ -38,7 +39,7 @@ def make_folder(
         for text in plan_doubts(request.config, plan):
             warnings.warn(text, stacklevel=3)
     manifest = read_manifest(out)
-    if manifest.is_complete:
+    if manifest.is_complete and not absences(out, manifest):
         return
     with record_counts(len(manifest.shards)) as counts:
         shown = RunProgress(

@@ -18,7 +18,7 @@ from gensig.execution.base import read_n_workers
 from gensig.options.configuration import Configuration
 from gensig.plan.make import describe_design, make_plan, varied_keys
 from gensig.plan.notes import n_different
-from gensig.production.folder import block_length, open_shard
+from gensig.production.shard_writing import block_length, open_shard
 from gensig.record.simulate import Record, forget_twins, simulate_records
 from gensig.text.amounts import duration_text, size_text
 

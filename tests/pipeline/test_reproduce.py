@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 from small_sets import TINY, make
 
 from gensig.cli import main
+from gensig.dataset.storage.atomic import sha256_file
 from gensig.dynamics.backends.registry import UNNAMED_BACKEND
 
 SET = (
@@ -69,6 +70,7 @@ def test_a_set_that_names_the_backend_of_old_sets_goes_on(
         content["state"] = "incomplete"
         lost = {"state": "planned", "sha256": "", "bytes": 0, "n_failed": 0}
         content["shards"][1] |= lost
+        content["files"]["config.yaml"] = sha256_file(folder / "config.yaml")
 
     edit_manifest(folder, lose_a_shard)
     name = "shards/shard-00001.h5"

@@ -14,7 +14,7 @@ from diagnose.data import ReplayStream, StreamingDataset, VibrationDataset
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.schema import SIGNALS
 from gensig.errors import ConfigError, DatasetError
-from gensig.production.folder import root_attributes
+from gensig.production.shard_writing import root_attributes
 from gensig.production.streaming import _as_stored, epoch_seed, open_stream
 from gensig.record import simulate
 from gensig.record.machines import read_machine

@@ -28,8 +28,8 @@ from gensig.options.configuration import Configuration
 from gensig.plan.doubts import plan_doubts
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.production.folder import open_shard
 from gensig.production.reproduction import recorded_row, simulate_twin
+from gensig.production.shard_writing import open_shard
 from gensig.record.machines import read_machine
 from gensig.record.options import AS_GIVEN, CROSSED
 from gensig.record.simulate import Record, simulate_record

@@ -16,6 +16,7 @@ from gensig.dataset.folder.failures import commonest, failure_reasons
 from gensig.dataset.folder.joining import joined_folder
 from gensig.dataset.folder.layout import MANIFEST, read_overrides
 from gensig.dataset.folder.manifest import read_manifest
+from gensig.dataset.folder.quick_check import absences
 from gensig.errors import ConfigError, Interrupted
 from gensig.options.compose import override_keys
 from gensig.options.configuration import Configuration
@@ -214,7 +215,7 @@ def resume(arguments: Namespace) -> int:
     if arguments.workers is not None:
         executor = LocalExecutor(n_workers=read_n_workers(arguments.workers))
     asked = _asked(out, arguments.overrides)
-    if manifest.is_complete:
+    if manifest.is_complete and not absences(out, manifest):
         if asked is not None:
             joined_folder(out, asked=asked.plain())
         return _print_complete(out, manifest.n_failed, manifest.n_records)
@@ -232,12 +233,14 @@ def finalize(arguments: Namespace) -> int:
     """Close a data set made by tasks of an array job, or accept an edited card."""
     from gensig.dataset.storage.checksums import accept_edits
     from gensig.production.folder import close_folder
+    from gensig.production.run_check import require_whole
 
     out = Path(arguments.folder)
     manifest = read_manifest(out)
     if not manifest.is_complete:
         return _print_complete(out, close_folder(out), manifest.n_records)
     accepted = accept_edits(out)
+    require_whole(out)
     if accepted:
         print(f"{out}: accepted as it is now: {', '.join(accepted)}")
     return _print_complete(out, manifest.n_failed, manifest.n_records)

@@ -34,13 +34,13 @@ from gensig.dataset.reader import Dataset, open_dataset
 from gensig.dataset.schema import known_column
 from gensig.dataset.splitting.protocols import MACHINE_COLUMNS
 from gensig.dataset.storage.atomic import (
+    cannot_write,
     publish,
     sync_file,
     sync_folder,
     temporary_name,
 )
 from gensig.dataset.storage.attributes import HDF5_ERRORS, set_attribute
-from gensig.dataset.storage.guard import first_line
 from gensig.dataset.storage.image import LIBRARY_VERSIONS
 from gensig.errors import DatasetError
 
@@ -105,8 +105,8 @@ def export(
             )
             _publish(temporary, out)
         except HDF5_ERRORS as error:
-            reason = getattr(error, "strerror", None) or first_line(error)
-            raise DatasetError(f"cannot write {out}: {reason}") from error
+            instead = "choose another --out PATH"
+            raise cannot_write(out, error, instead=instead) from error
         finally:
             if temporary.is_dir():
                 shutil.rmtree(temporary, ignore_errors=True)

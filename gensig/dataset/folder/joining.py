@@ -31,8 +31,35 @@ def joined_folder(
 
     Raises
     ------
-    DatasetError    for another version, a configuration or plan that was changed (with the keys
-                    that differ), and a compression whose package is missing
+    DatasetError    as `agreed_folder`, and for a plan that is missing or was changed
+    """
+    manifest, config = agreed_folder(out, asked=asked)
+    if not (out / PLAN).is_file():
+        raise DatasetError(
+            f"{out / PLAN} is missing; `gensig resume {out}` makes it again"
+        )
+    if manifest.files.get(PLAN) != sha256_file(out / PLAN):
+        raise DatasetError(
+            f"{out / PLAN} was changed since the folder was begun; restore it, or start a new "
+            "folder"
+        )
+    return manifest, config
+
+
+def agreed_folder(
+    out: Path, *, asked: ConfigContent | None = None
+) -> tuple[Manifest, ConfigContent]:
+    """Manifest and configuration of a folder that this version and configuration began.
+
+    Parameters
+    ----------
+    out : folder of a data set; its plan is not looked at
+    asked : a configuration that must agree with the folder's in all that decides bits
+
+    Raises
+    ------
+    DatasetError    for another version, a configuration that was changed (with the keys that
+                    differ), and a compression whose package is missing
     """
     manifest, config = read_manifest(out), read_config(out)
     if manifest.generator_version != __version__:
@@ -53,11 +80,6 @@ def joined_folder(
         raise DatasetError(
             f"{out} was begun with another {_listed(keys)}; leave that out, or start a new "
             "folder: only executor.* may change"
-        )
-    if manifest.files.get(PLAN) != sha256_file(out / PLAN):
-        raise DatasetError(
-            f"{out / PLAN} was changed since the folder was begun; restore it, or start a new "
-            "folder"
         )
     creation_options(config["dataset"]["compression"])  # its package may be missing
     return manifest, config

@@ -1,6 +1,7 @@
 """Names of the files in a data-set folder, and its manifest with the states of the shards."""
 
 import json
+import os
 import re
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 import yaml
 
 from gensig.dataset.schema import READABLE_VERSIONS, SCHEMA_VERSION
-from gensig.dataset.storage.atomic import read_text, write_text
+from gensig.dataset.storage.atomic import link_text, read_text, write_text
 from gensig.errors import DatasetError
 
 MANIFEST = "manifest.json"
@@ -25,6 +26,19 @@ SHARDS = "shards"
 SPLITS = "splits"
 FIGURES = "figures"
 BEGINNING = ".beginning"  # in a folder that has no manifest yet
+NAMES = (
+    MANIFEST,
+    CONFIG,
+    OVERRIDES,
+    PLAN,
+    INDEX,
+    CARD,
+    CROISSANT,
+    CHECKSUMS,
+    LOG,
+    BEGINNING,
+)
+PARTS = (SHARDS, SPLITS, FIGURES)  # folders
 
 TEXT_BYTES_LIMIT = 256 * 1024**2
 CONFIG_BYTES_LIMIT = 1024**2
@@ -127,15 +141,36 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
     write_text(folder / MANIFEST, manifest_text(manifest))
 
 
+def refuse_links(folder: Path) -> None:
+    """Raise DatasetError for the first file or folder of a data set that is a symbolic link.
+
+    It does not matter to where a link leads. The folder itself may be named by a link, and so may
+    files that are no part of the data set.
+    """
+    names = [folder / name for name in (*NAMES, *PARTS)]
+    for path in names:
+        if path.is_symlink():
+            raise DatasetError(link_text(path))
+    for part in names[len(NAMES) :]:
+        if not part.is_dir():
+            continue
+        with os.scandir(part) as entries:
+            linked = sorted(entry.name for entry in entries if entry.is_symlink())
+        if linked:
+            raise DatasetError(link_text(part / linked[0]))
+
+
 def read_manifest(folder: Path) -> Manifest:
     """The manifest of a folder, every name and type checked.
 
     Raises
     ------
-    DatasetError    when the folder is no data set, or the manifest is damaged, newer than this
-                    gensig, or names a file that is not one of a data set (such as '../other')
+    DatasetError    when the folder is no data set, a part of it is a symbolic link, or the
+                    manifest is damaged, newer than this gensig, or names a file that is not one
+                    of a data set (such as '../other')
     """
     folder = Path(folder)
+    refuse_links(folder)
     path = folder / MANIFEST
     if not path.is_file():
         if not folder.exists():
@@ -260,12 +295,12 @@ def read_config(folder: Path) -> ConfigContent:
 
     DatasetError when it is anything else.
     """
-    return read_config_file(Path(folder) / CONFIG)
+    return read_config_file(Path(folder) / CONFIG, follow_links=False)
 
 
-def read_config_file(path: Path) -> ConfigContent:
-    """A configuration as plain data, see `read_config`."""
-    content = _read_plain(path)
+def read_config_file(path: Path, *, follow_links: bool = True) -> ConfigContent:
+    """A configuration as plain data, see `read_config`; a file of its own may be a link."""
+    content = _read_plain(path, follow_links=follow_links)
     if not isinstance(content, dict):
         raise DatasetError(f"{path} is no mapping; restore it from a copy")
     return content
@@ -277,7 +312,7 @@ def read_overrides(folder: Path) -> list[str]:
     DatasetError when `overrides.yaml` is anything but a list of texts.
     """
     path = Path(folder) / OVERRIDES
-    content = _read_plain(path)
+    content = _read_plain(path, follow_links=False)
     if not isinstance(content, list) or not all(
         isinstance(word, str) for word in content
     ):
@@ -285,9 +320,9 @@ def read_overrides(folder: Path) -> list[str]:
     return content
 
 
-def _read_plain(path: Path) -> Any:
+def _read_plain(path: Path, *, follow_links: bool) -> Any:
     """Content of a YAML file without tags, aliases and deep nesting."""
-    text = read_text(path, limit=CONFIG_BYTES_LIMIT)
+    text = read_text(path, limit=CONFIG_BYTES_LIMIT, follow_links=follow_links)
     try:
         _refuse_yaml_bombs(text, path)
         return yaml.load(text, Loader=LOADER)

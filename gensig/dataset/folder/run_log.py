@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import suppress
 from pathlib import Path
 
@@ -12,5 +13,9 @@ from gensig.dataset.folder.layout import LOG
 def log(folder: Path, text: str) -> None:
     """Append one line; a disk that refuses it stops nothing, because the log decides nothing."""
     line = f"{now()} {' '.join(text.split())}\n"
-    with suppress(OSError), (folder / LOG).open("a", encoding="utf-8") as file:
-        file.write(line)
+    flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW
+    with (
+        suppress(OSError),
+        os.fdopen(os.open(folder / LOG, flags, 0o666), "ab") as file,
+    ):
+        file.write(line.encode("utf-8"))

@@ -7,12 +7,9 @@ import h5py
 import numpy as np
 
 from gensig.dataset.columns import COLUMNS
-from gensig.dataset.folder.inspection import inspect
 from gensig.dataset.folder.layout import (
     CONFIG,
-    INDEX,
     MANIFEST,
-    OVERRIDES,
     PLAN,
     SHARDS,
     SPLITS,
@@ -22,6 +19,11 @@ from gensig.dataset.folder.layout import (
     read_manifest,
 )
 from gensig.dataset.folder.manifest import file_digests, identity_hash
+from gensig.dataset.folder.quick_check import (
+    label_problem,
+    size_problem,
+    unlisted_files,
+)
 from gensig.dataset.plan import Plan, read_plan
 from gensig.dataset.schema import SCALES
 from gensig.dataset.splitting.split_check import split_problems
@@ -29,11 +31,15 @@ from gensig.dataset.splitting.splits import read_split
 from gensig.dataset.storage.atomic import sha256_file
 from gensig.dataset.storage.attributes import HDF5_ERRORS, read_attributes
 from gensig.dataset.storage.checksums import differences
-from gensig.dataset.storage.guard import datasets, first_line, open_shard, read_rows
+from gensig.dataset.storage.guard import (
+    datasets,
+    first_line,
+    open_shard,
+    read_rows,
+    shard_labels,
+)
 from gensig.dataset.storage.quantization import is_scale, read_signal
 from gensig.errors import DatasetError
-
-__all__ = ["VerifyResult", "inspect", "verify"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +82,18 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
         return VerifyResult(
             complete=False, problems=[str(error)], n_records=0, n_failed=0
         )
-    problems = _state(folder, manifest) + _extra_files(folder, manifest)
+    problems = _unfinished(folder, manifest) + damage(folder, manifest, quick=quick)
+    return VerifyResult(
+        complete=not problems,
+        problems=problems,
+        n_records=manifest.n_records,
+        n_failed=manifest.n_failed,
+    )
+
+
+def damage(folder: Path, manifest: Manifest, *, quick: bool = False) -> list[str]:
+    """Problems of a data set as far as it is made, one line each; see `verify`."""
+    problems = _file_names(folder, manifest) + _extra_files(folder, manifest)
     if manifest.is_complete:
         problems += [
             difference.line for difference in differences(folder, manifest, quick=quick)
@@ -93,19 +110,19 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
         if entry.state != "done":
             continue
         path = folder / SHARDS / entry.name
-        damage = _bytes_differ(path, entry, manifest, quick=quick)
-        problems += damage
+        differing = _bytes_differ(path, entry, manifest, quick=quick)
+        problems += differing
         if quick or not path.is_file():
             continue
         try:
             with open_shard(path, folder=folder) as file:
-                if not damage:
-                    problems += _version_differs(file, entry, manifest)
+                if not differing:
+                    problems += _label_differs(file, entry, manifest, i)
                     reference = reference or _description(file, path)
                     problems += _description_differs(file, path, reference)
                 lines = _rows_differ(file, entry, plan, int(starts[i]))
                 # A damaged file can have thousands of wrong rows: one line is enough.
-                if damage:
+                if differing:
                     lines = lines[:1]
                 problems += lines
         except DatasetError as error:
@@ -114,15 +131,10 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
             problems.append(
                 f"{entry.name} cannot be read ({first_line(error)}); it is damaged"
             )
-    return VerifyResult(
-        complete=not problems,
-        problems=problems,
-        n_records=manifest.n_records,
-        n_failed=manifest.n_failed,
-    )
+    return problems
 
 
-def _state(folder: Path, manifest: Manifest) -> list[str]:
+def _unfinished(folder: Path, manifest: Manifest) -> list[str]:
     problems = [
         f"{entry.name} could not be made; run `gensig resume {folder}`"
         for entry in manifest.shards
@@ -133,15 +145,16 @@ def _state(folder: Path, manifest: Manifest) -> list[str]:
             f"incomplete: {manifest.n_done} of {len(manifest.shards)} shards are done and the "
             f"data set was never closed; run `gensig resume {folder}`"
         )
-    needed, present = [CONFIG, PLAN, OVERRIDES], []
+    return problems
+
+
+def _file_names(folder: Path, manifest: Manifest) -> list[str]:
+    """Files that the manifest should list, that are missing, and that it should not have."""
+    problems, present = unlisted_files(manifest), []
     if manifest.is_complete:
-        needed.append(INDEX)
         present = sorted(
             f"{SPLITS}/{path.name}" for path in (folder / SPLITS).glob("*")
         )
-    for name in needed:
-        if name not in manifest.files:
-            problems.append(f"the manifest does not list {name}; it is damaged")
     for name in manifest.files:
         if not (folder / name).is_file():
             problems.append(f"{name} is missing")
@@ -222,12 +235,8 @@ def _splits(folder: Path, manifest: Manifest, plan: Plan) -> list[str]:
 def _bytes_differ(
     path: Path, entry: ShardEntry, manifest: Manifest, *, quick: bool
 ) -> list[str]:
-    if not path.is_file():
-        return [f"{entry.name} is missing"]
-    size = path.stat().st_size
-    if size != entry.bytes:
-        state = "truncated" if size < entry.bytes else "not the recorded file"
-        return [f"{entry.name} is {state}: {size} bytes, recorded are {entry.bytes}"]
+    if problem := size_problem(path, entry):
+        return [problem]
     if quick:
         return []
     digest = sha256_file(path)
@@ -268,15 +277,13 @@ def _description_differs(file: h5py.File, path: Path, reference: dict) -> list[s
     return problems
 
 
-def _version_differs(
-    file: h5py.File, entry: ShardEntry, manifest: Manifest
+def _label_differs(
+    file: h5py.File, entry: ShardEntry, manifest: Manifest, index: int
 ) -> list[str]:
-    version = read_attributes(file)["schema_version"]
-    if version == manifest.schema_version:
-        return []
-    return [
-        f"{entry.name} has format version {version}, the manifest says {manifest.schema_version}"
-    ]
+    problem = label_problem(shard_labels(file), manifest, index)
+    if problem:
+        return [f"{entry.name} {problem}"]
+    return []
 
 
 def _rows_differ(

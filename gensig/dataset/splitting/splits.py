@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from gensig.dataset.folder.layout import TEXT_BYTES_LIMIT
-from gensig.dataset.storage.atomic import read_text
+from gensig.dataset.storage.atomic import read_text, require_digest
 from gensig.errors import DatasetError
 
 SUBSETS = ("train", "validation", "test")
@@ -46,9 +46,14 @@ class SplitTable:
         return zip(*columns, strict=True)
 
 
-def read_split(path: Path) -> SplitTable:
-    """Read one `splits/<protocol>.csv`; DatasetError names the file and what is wrong with it."""
+def read_split(path: Path, *, sha256: str | None = None) -> SplitTable:
+    """Read one `splits/<protocol>.csv`; DatasetError names the file and what is wrong with it.
+
+    With ``sha256``, a file of another digest is refused.
+    """
     text = read_text(path, limit=TEXT_BYTES_LIMIT * 4)
+    if sha256 is not None:
+        require_digest(path, text, sha256)
     try:
         header, *rows = csv.reader(io.StringIO(text, newline=""), strict=True)
         if tuple(header) != HEADER:

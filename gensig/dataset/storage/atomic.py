@@ -5,6 +5,7 @@ import fcntl
 import hashlib
 import os
 import secrets
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -12,9 +13,14 @@ from pathlib import Path
 from gensig.errors import DatasetError
 
 TEMPORARY_SUFFIX = ".tmp"
-# causes of a refusal by the disk
-FULL = (errno.ENOSPC, errno.EDQUOT)
-FORBIDDEN = (errno.EACCES, errno.EPERM)
+# remedies where the disk refuses to write, by the number of the error
+REMEDIES = {
+    errno.ENOSPC: "free some space there",
+    errno.EDQUOT: "your quota there is used up: delete files of yours, or ask for more",
+    errno.EACCES: "get the right to write there",
+    errno.EPERM: "the file system forbids it, even to its owner: lift the attribute (lsattr)",
+    errno.EROFS: "it is mounted read-only: mount it for writing",
+}
 
 
 def temporary_name(path: Path) -> Path:
@@ -88,44 +94,54 @@ def write_bytes(path: Path, content: bytes | memoryview) -> None:
             file.write(content)
         publish(temporary, path)
     except OSError as error:
+        if error.errno == errno.ENOENT and not path.parent.is_dir():
+            raise DatasetError(
+                f"cannot write {path}: its folder is missing, it was deleted or renamed; "
+                "put it back"
+            ) from error
         raise cannot_write(path, error) from error
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def cannot_write(path: Path, error: Exception) -> DatasetError:
-    """Error of one line with the cause: a full disk, no right to write, no place for folders."""
+def cannot_write(
+    path: Path, error: Exception, *, instead: str = "choose another out=DIR"
+) -> DatasetError:
+    """Error of one line with the cause of a refusal to write, and the remedy for that cause.
+
+    Parameters
+    ----------
+    path : file or folder that was to be written
+    error : what the system raised; its ``errno`` chooses the remedy of `REMEDIES`
+    instead : remedy that helps whatever the cause is
+    """
     reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
-    remedy = "choose another out=DIR"
     number = getattr(error, "errno", None)
-    if number in FULL:
-        remedy = f"free some space or {remedy}"
+    remedy = instead
+    if number in REMEDIES:
+        remedy = f"{REMEDIES[number]}, or {instead}"
     elif number == errno.ENOENT:
         standing = next(folder for folder in path.absolute().parents if folder.exists())
         reason = f"{standing} takes no new folders or files"
-    elif number in FORBIDDEN:
-        remedy = f"get the right to write there or {remedy}"
     return DatasetError(f"cannot write {path}: {reason}; {remedy}")
 
 
-def read_text(path: Path, *, limit: int) -> str:
+def read_text(path: Path, *, limit: int, follow_links: bool = False) -> str:
     """A UTF-8 file of at most `limit` bytes.
 
-    DatasetError when it is absent, no ordinary file, too long or not text.
+    Parameters
+    ----------
+    path : Path
+    limit : int            bytes
+    follow_links : bool    False refuses a symbolic link, as in a data set; True reads its target
+
+    Raises
+    ------
+    DatasetError    when it is absent, no ordinary file, a link, too long or not text
     """
     try:
-        if not path.is_file():
-            raise DatasetError(
-                f"{path} is missing or no ordinary file; the folder is damaged or no gensig data "
-                "set"
-            )
-        size = path.stat().st_size
-        if size > limit:
-            raise DatasetError(
-                f"{path} has {size} bytes, at most {limit} are allowed; it is no file of a "
-                "gensig data set"
-            )
-        return path.read_bytes().decode("utf-8")
+        content = _ordinary_bytes(path, limit=limit, follow_links=follow_links)
+        return content.decode("utf-8")
     except UnicodeDecodeError as error:
         raise DatasetError(
             f"{path} is not UTF-8 text (byte {error.start}); it is damaged, restore it"
@@ -134,6 +150,54 @@ def read_text(path: Path, *, limit: int) -> str:
         raise DatasetError(
             f"{path} cannot be read: {error}; check its permissions"
         ) from error
+
+
+def _ordinary_bytes(path: Path, *, limit: int, follow_links: bool) -> bytes:
+    """Bytes of an ordinary file; type and size are asked of what was opened, not of its name."""
+    flags = os.O_RDONLY | os.O_NONBLOCK  # a named pipe must not hang
+    if not follow_links:
+        flags |= os.O_NOFOLLOW
+    try:
+        descriptor = os.open(path, flags)
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise DatasetError(link_text(path)) from error
+        if error.errno in (errno.ENOENT, errno.ENOTDIR, errno.ENXIO):
+            raise _no_file(path) from error
+        raise
+    with os.fdopen(descriptor, "rb") as file:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise _no_file(path)
+        if status.st_size > limit:
+            raise DatasetError(
+                f"{path} has {status.st_size} bytes, at most {limit} are allowed; it is no file "
+                "of a gensig data set"
+            )
+        return file.read()
+
+
+def _no_file(path: Path) -> DatasetError:
+    return DatasetError(
+        f"{path} is missing or no ordinary file; the folder is damaged or no gensig data set"
+    )
+
+
+def link_text(path: Path) -> str:
+    """The line on a symbolic link, which is never a part of a data set."""
+    return (
+        f"{path} is a symbolic link; a data set holds its files itself: put the file or folder "
+        "in place of the link"
+    )
+
+
+def require_digest(path: Path, text: str, sha256: str) -> None:
+    """Raise DatasetError for a text that was read from a file and has another sha256."""
+    if hashlib.sha256(text.encode("utf-8")).hexdigest() != sha256:
+        raise DatasetError(
+            f"{path} was altered: its sha256 is not the one in the manifest; restore it from a "
+            "copy"
+        )
 
 
 def sha256_file(path: Path) -> str:

@@ -12,8 +12,10 @@ from gensig.dataset.schema import (
     REQUIRED_ATTRIBUTES,
     SAMPLE_TYPES,
     SCALES,
+    SHARD_INDEX,
     known_column,
 )
+from gensig.dataset.storage.atomic import link_text
 from gensig.dataset.storage.attributes import HDF5_ERRORS, decoded, read_attributes
 from gensig.dataset.storage.compression import (
     BLOSC2_CHUNK_LIMIT,
@@ -54,12 +56,13 @@ def open_file(path: Path) -> h5py.File:
 def open_shard(path: Path, *, folder: Path | None = None) -> h5py.File:
     """A shard, open for reading after `check_shard`.
 
-    With `folder`, refused when the name leads out of that folder.
+    With `folder`, refused when the file or a folder above it, up to that one, is a link.
     """
-    if folder is not None and not path.resolve().is_relative_to(folder.resolve()):
-        raise DatasetError(
-            f"{path} is a link that leads out of {folder}; put the file itself there"
-        )
+    if folder is not None:
+        above = [part for part in path.parents if part.is_relative_to(folder)]
+        for part in (path, *above[:-1]):
+            if part.is_symlink():
+                raise DatasetError(link_text(part))
     file = open_file(path)
     try:
         check_shard(file, path)
@@ -265,6 +268,16 @@ def _check_attributes(file: h5py.File, path: Path) -> None:
     )
     if n_names != n_channels:
         raise DatasetError(f"{path}: {n_names} channel names for {n_channels} channels")
+
+
+def shard_labels(file: h5py.File) -> dict:
+    """Root attributes of a shard, and its number as `SHARD_INDEX` where it says that."""
+    labels = read_attributes(file)
+    labels.pop(SHARD_INDEX, None)
+    number = read_attributes(file["record_id"]).get(SHARD_INDEX)
+    if number is not None:
+        labels[SHARD_INDEX] = number
+    return labels
 
 
 def read_rows(data: h5py.Dataset) -> np.ndarray:

@@ -29,6 +29,7 @@ from gensig.dataset.schema import (
     REQUIRED_ATTRIBUTES,
     SAMPLE_TYPES,
     SCALES,
+    SHARD_INDEX,
     SIGNALS,
     find_signal,
     signal_column,
@@ -88,6 +89,7 @@ class ShardWriter:
     lives : bool         whether records are snapshots of lives, with `LIFE_COLUMNS`
     references : bool    whether some records are references, with `IS_REFERENCE`
     gears : bool         whether records differ in their gears, with `GEAR_COLUMNS`
+    shard_index : int    number of the shard in its data set; None stores none
 
     Attributes
     ----------
@@ -115,7 +117,9 @@ class ShardWriter:
         lives: bool = False,
         references: bool = False,
         gears: bool = False,
+        shard_index: int | None = None,
     ) -> None:
+        self.shard_index = shard_index
         self.path = Path(path)
         self.n_records = n_records
         self.signals = {name: tuple(shape) for name, shape in signals.items()}
@@ -309,6 +313,8 @@ class ShardWriter:
                 name, data=rows, dtype=column.storage_dtype, track_times=False
             )
             set_attribute(data, "unit", unit_in_file(column, self.attributes))
+        if self.shard_index is not None:
+            set_attribute(self._file["record_id"], SHARD_INDEX, self.shard_index)
         self.n_failed = int(np.count_nonzero(self._rows["status"] == b"failed"))
         with fixed_settings():  # HDF5 compresses what is in its cache now
             self.sha256, self.n_bytes = self._file.publish(self.path)

@@ -18,8 +18,9 @@ from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.storage.checksums import read_checksums
 from gensig.execution.local import LocalExecutor
-from gensig.production.folder import run_folder, write_shard
+from gensig.production.folder import run_folder
 from gensig.production.record_counts import RecordCounts, record_counts
+from gensig.production.shard_writing import write_shard
 from gensig.terminal import run_progress
 from gensig.terminal.run_progress import COMPILING, Progress, RunProgress
 

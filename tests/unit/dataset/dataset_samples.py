@@ -6,8 +6,9 @@ import h5py
 import numpy as np
 
 from gensig.dataset.folder.beginning import create_folder
+from gensig.dataset.folder.closing import finalize
 from gensig.dataset.folder.layout import shard_path
-from gensig.dataset.folder.manifest import finalize, identity_hash, record_shard
+from gensig.dataset.folder.manifest import identity_hash, record_shard
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.plan import Plan, record_ids, shard_rows
 from gensig.dataset.splitting.splits import SUBSETS
@@ -118,17 +119,24 @@ def writer_of(path, n_records=1, **changes):
     return ShardWriter(path, n_records=n_records, **(given | changes))
 
 
-def forge(folder, shard, change):
-    """Change a shard, make every sha256 and size agree, and return the problems found."""
-    path = shard_path(folder, shard)
-    with h5py.File(path, "r+") as file:
-        change(file)
+def trust(folder):
+    """Make every sha256 and size in a folder fit its files, as only a stranger would."""
     manifest = json.loads((folder / "manifest.json").read_text())
-    facts = {"sha256": sha256_file(path), "bytes": path.stat().st_size}
-    manifest["shards"][shard] |= facts
+    for index, entry in enumerate(manifest["shards"]):
+        path = shard_path(folder, index)
+        entry |= {"sha256": sha256_file(path), "bytes": path.stat().st_size}
+    digests = {name: sha256_file(folder / name) for name in manifest["files"]}
+    manifest["files"] = digests
     (folder / "manifest.json").write_text(json.dumps(manifest))
     (folder / "SHA256SUMS").unlink()
     accept_edits(folder)
+
+
+def forge(folder, shard, change):
+    """Change a shard, make every sha256 and size agree, and return the problems found."""
+    with h5py.File(shard_path(folder, shard), "r+") as file:
+        change(file)
+    trust(folder)
     return "\n".join(verify(folder).problems)
 
 
@@ -181,20 +189,30 @@ def build(
     clean=False,
     twin=False,
     figures=False,
+    labelled=False,
+    seed=7,
     **storage,
 ):
-    """A data-set folder; fewer shards or close=False make an interrupted one."""
-    identity = identity_hash(CONFIG, "0.1.0")
+    """A data-set folder; fewer shards or close=False make an interrupted one.
+
+    With ``labelled``, shards name their data set and number, as gensig writes them; without, they
+    are those of an older version.
+    """
+    config = CONFIG | {"seed": seed}
+    identity = identity_hash(config, "0.1.0")
     create_folder(
         out,
-        config=CONFIG,
-        overrides=["seed=7"],
+        config=config,
+        overrides=[f"seed={seed}"],
         plan=plan,
         identity=identity,
-        seed=7,
+        seed=seed,
         generator_version="0.1.0",
     )
     for shard in shards if shards is not None else range(plan.n_shards):
+        if labelled:
+            storage["attributes"] = ATTRIBUTES | {"identity": identity}
+            storage["shard_index"] = shard
         writer = write_shard(
             shard_path(out, shard),
             plan,

@@ -8,7 +8,7 @@ import pytest
 from dataset_samples import CLASSES, build, row_of
 from numpy.testing import assert_array_equal
 
-import gensig.dataset.reader as reader_module
+import gensig.dataset.shard_files as shard_files
 from gensig.dataset.reader import open_dataset
 from gensig.errors import DatasetError
 
@@ -115,10 +115,10 @@ def test_without_pandas_it_says_what_to_install(data, monkeypatch):
 
 
 def test_few_files_stay_open(data, monkeypatch):
-    monkeypatch.setattr(reader_module, "MAX_OPEN_SHARDS", 2)
+    monkeypatch.setattr(shard_files, "MAX_OPEN_SHARDS", 2)
     for index in (0, 10, 20, 30, 0):
         data.signals(index)
-    assert len(data._files) == 2
+    assert len(data._shards._files) == 2
 
 
 def test_split(data):
@@ -171,7 +171,7 @@ def test_pickle_drops_open_files(data):
     data.signals(0)
     data.column("label")
     copy = pickle.loads(pickle.dumps(data))
-    assert copy._files == {}
+    assert copy._shards._files == {}
     assert_array_equal(copy.signals(35), data.signals(35))
     copy.close()
 

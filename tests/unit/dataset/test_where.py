@@ -9,6 +9,7 @@ from dataset_samples import build, row_of, write_shard
 from numpy.testing import assert_array_equal
 
 import gensig.dataset.reader as reader_module
+import gensig.dataset.shard_files as shard_files
 from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.reader import open_dataset
 from gensig.dataset.storage.guard import open_shard
@@ -126,7 +127,7 @@ def test_a_shard_is_checked_again_only_when_it_changed(folder, plan, monkeypatch
 
     with open_dataset(folder) as data:
         data.signals(10)
-        monkeypatch.setattr(reader_module, "open_shard", counted)
+        monkeypatch.setattr(shard_files, "open_shard", counted)
         data.close()
         data.signals(10)
         assert checks == []

@@ -10,8 +10,9 @@ from dataset_samples import ATTRIBUTES, build, make_plan, write_shard
 from matplotlib.image import imread
 
 from gensig.dataset.cards.class_figures import example_records, write_class_figures
+from gensig.dataset.folder.closing import finalize
 from gensig.dataset.folder.layout import shard_path
-from gensig.dataset.folder.manifest import finalize, record_shard
+from gensig.dataset.folder.manifest import record_shard
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.plan import Plan
 from gensig.dataset.reader import open_dataset

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from dataset_samples import build, make_plan
 
-from gensig.dataset.folder.manifest import finalize
+from gensig.dataset.folder.closing import finalize
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.storage.checksums import accept_edits, read_checksums
 from gensig.errors import DatasetError

@@ -12,11 +12,11 @@ import yaml
 from dataset_samples import CONFIG, build, make_plan, write_shard
 
 from gensig.dataset.folder.beginning import create_folder
+from gensig.dataset.folder.closing import finalize
 from gensig.dataset.folder.layout import read_config, shard_path
 from gensig.dataset.folder.manifest import (
     deciding,
     differing_keys,
-    finalize,
     identity_hash,
     read_manifest,
     record_shard,

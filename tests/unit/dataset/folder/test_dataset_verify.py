@@ -14,8 +14,9 @@ from dataset_samples import (
     write_shard,
 )
 
+from gensig.dataset.folder.inspection import inspect
 from gensig.dataset.folder.layout import shard_path
-from gensig.dataset.folder.verify import inspect, verify
+from gensig.dataset.folder.verify import verify
 from gensig.dataset.plan import Plan, plan_text
 from gensig.errors import DatasetError
 
@@ -145,12 +146,6 @@ def test_folder_that_is_no_datasetting(tmp_path):
     os.mkfifo(tmp_path / "manifest.json")  # must not hang
     with pytest.raises(DatasetError, match="no gensig data set"):
         verify(tmp_path)
-
-
-def test_linked_shards_outside_the_folder_are_refused(folder, tmp_path):
-    (folder / "shards").rename(tmp_path / "elsewhere")
-    (folder / "shards").symlink_to(tmp_path / "elsewhere")
-    assert any("leads out" in problem for problem in verify(folder).problems)
 
 
 def test_inspect_shows_what_is_there(folder, tmp_path):

@@ -176,7 +176,7 @@ def test_the_command_names_what_it_wrote(folder, tmp_path, capsys):
 def test_a_foreign_plan_names_no_file(folder, tmp_path):
     """Ids become file names, so that a shard cannot choose where a wav file goes."""
     with h5py.File(shard_path(folder, 0), "r+") as file:
-        file["record_id"][0] = b"../../evil"
+        file["record_id"][1] = b"../../evil"
     with pytest.raises(DatasetError, match="different record ids"):
         export(folder, "wav", tmp_path / "all")
     assert not list(tmp_path.rglob("evil*"))

@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 import yaml
-from dataset_samples import build
+from dataset_samples import build, trust
 from numpy.testing import assert_array_equal
 from pyarrow import parquet
 from split_samples import CLASSES, FAILED, LEAKY, REFERENCES, every_protocol_plan
@@ -64,6 +64,7 @@ def poisoned(tmp_path):
     moved = re.sub(r"(?m)^(\w+,0,1),train$", r"\1,test", text, count=1)
     assert moved != text
     path.write_text(moved)
+    trust(folder)
     return folder
 
 
@@ -140,6 +141,7 @@ def test_stretches_of_different_length(tmp_path):
     path = folder / "splits" / f"{LEAKY}.csv"
     rows = "r000001,0,0.3025,train\nr000001,0.3025,1,test\nr000002,0,0.001,test\n"
     path.write_text(f"record_id,start_fraction,stop_fraction,subset\n{rows}")
+    trust(folder)
     export(folder, "hf", tmp_path / "hub", protocols=[LEAKY])
     loaded = datasets.load_dataset(str(tmp_path / "hub"))
     assert set(loaded) == {"train", "test"}
@@ -237,6 +239,7 @@ def test_a_protocol_of_a_later_version_is_exported_by_its_name_only(tmp_path):
     manifest = json.loads((folder / "manifest.json").read_text())
     manifest["files"]["splits/by_moon.csv"] = "0" * 64
     (folder / "manifest.json").write_text(json.dumps(manifest))
+    trust(folder)
     export(folder, "npz", tmp_path / "x.npz")
     with np.load(tmp_path / "x.npz") as arrays:
         assert "split/by_unit" in arrays

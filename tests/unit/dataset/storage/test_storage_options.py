@@ -22,8 +22,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 import gensig.dataset.storage.guard as guard_module
 import gensig.dataset.storage.shard as shard_module
 from gensig.cli import main
+from gensig.dataset.folder.inspection import inspect
 from gensig.dataset.folder.layout import shard_path
-from gensig.dataset.folder.verify import inspect, verify
+from gensig.dataset.folder.verify import verify
 from gensig.dataset.reader import open_dataset
 from gensig.dataset.schema import SAMPLE_TYPES, SCALES
 from gensig.dataset.storage.compression import COMPRESSIONS, compression_of

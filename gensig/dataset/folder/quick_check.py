@@ -1,0 +1,137 @@
+"""Checks of a data set that read no record: names, sizes, and what a shard says of itself."""
+
+import stat
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gensig.dataset.folder.layout import (
+    CHECKSUMS,
+    CONFIG,
+    INDEX,
+    MANIFEST,
+    OVERRIDES,
+    PLAN,
+    Manifest,
+    ShardEntry,
+    shard_path,
+)
+from gensig.dataset.schema import IDENTITY, SHARD_INDEX
+from gensig.dataset.storage.atomic import sha256_file
+from gensig.dataset.storage.checksums import differences, read_checksums
+from gensig.errors import DatasetError
+
+
+def check_opening(folder: Path, manifest: Manifest) -> None:
+    """Check what decides which records a reader gives, as far as that reads no record.
+
+    The manifest is compared with `SHA256SUMS` where there is one, the plan and the sizes of the
+    finished shards with the manifest.
+
+    Raises
+    ------
+    DatasetError    for the first difference
+    """
+    problems = unlisted_files(manifest) or _altered_manifest(folder, manifest)
+    if not problems and _digest(folder / PLAN) != manifest.files[PLAN]:
+        problems = [f"{PLAN} is missing or was altered"]
+    if not problems:
+        problems = shard_sizes(folder, manifest)
+    if problems:
+        raise DatasetError(f"{folder}: {problems[0]}; run `gensig verify {folder}`")
+
+
+def unlisted_files(manifest: Manifest) -> list[str]:
+    """A line for each file that every manifest lists, and this one does not."""
+    needed = [CONFIG, PLAN, OVERRIDES]
+    if manifest.is_complete:
+        needed.append(INDEX)
+    return [
+        f"the manifest does not list {name}; it is damaged"
+        for name in needed
+        if name not in manifest.files
+    ]
+
+
+def _altered_manifest(folder: Path, manifest: Manifest) -> list[str]:
+    path = folder / CHECKSUMS
+    if not manifest.is_complete or not path.is_file():
+        return []
+    if read_checksums(folder).get(MANIFEST) == _digest(folder / MANIFEST):
+        return []
+    return [f"{MANIFEST} was altered: its sha256 is not the one in {CHECKSUMS}"]
+
+
+def _digest(path: Path) -> str:
+    """The sha256 of an ordinary file; '' where there is none."""
+    if not path.is_file():
+        return ""
+    return sha256_file(path)
+
+
+def shard_sizes(folder: Path, manifest: Manifest) -> list[str]:
+    """A line for each finished shard that is missing, or has another size than recorded."""
+    lines = [
+        size_problem(shard_path(folder, index), entry)
+        for index, entry in enumerate(manifest.shards)
+        if entry.state == "done"
+    ]
+    return [line for line in lines if line]
+
+
+def size_problem(path: Path, entry: ShardEntry) -> str:
+    """One line on a shard that is missing or has another size than recorded; '' for none."""
+    try:
+        status = path.stat()
+    except OSError:
+        return f"{entry.name} is missing"
+    if not stat.S_ISREG(status.st_mode):
+        return f"{entry.name} is no ordinary file"
+    size = status.st_size
+    if size == entry.bytes:
+        return ""
+    state = "truncated" if size < entry.bytes else "not the recorded file"
+    return f"{entry.name} is {state}: {size} bytes, recorded are {entry.bytes}"
+
+
+def label_problem(labels: Mapping[str, Any], manifest: Manifest, index: int) -> str:
+    """One line on labels that are not those of a shard of this set; '' for none.
+
+    Shards of older sets say neither their number nor their data set.
+
+    Parameters
+    ----------
+    labels : root attributes of the shard, and its number as `SHARD_INDEX`
+    manifest : manifest of the data set
+    index : number of the shard by its name
+    """
+    version = labels["schema_version"]
+    if version != manifest.schema_version:
+        return (
+            f"has format version {version}, the manifest says {manifest.schema_version}"
+        )
+    identity = labels.get(IDENTITY, manifest.identity)
+    if identity != manifest.identity:
+        return (
+            f"is of another data set: its identity is {str(identity)[:12]!a}, the manifest "
+            f"says '{manifest.identity[:12]}'"
+        )
+    number = labels.get(SHARD_INDEX, index)
+    if number != index:
+        return f"is swapped: it says that it is shard {str(number)[:12]}"
+    return ""
+
+
+def absences(folder: Path, manifest: Manifest) -> list[str]:
+    """A line for each part of a data set that is missing; no record is read.
+
+    Shards are compared by their sizes; of a complete set the manifest is compared with
+    `SHA256SUMS`, whose files must be there.
+    """
+    lines = [
+        f"{name} is missing" for name in manifest.files if not (folder / name).is_file()
+    ]
+    lines += shard_sizes(folder, manifest)
+    if manifest.is_complete:
+        lines += [each.line for each in differences(folder, manifest, quick=True)]
+    return lines
