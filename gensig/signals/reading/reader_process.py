@@ -180,7 +180,9 @@ def _filled(values: np.ndarray, pipe: IO[bytes]) -> bool:
 
 def _end(status: int, is_late: bool, limits: Limits) -> str:
     """Reason for a process that ended without its answer."""
-    if is_late or status == -signal.SIGXCPU:
+    if is_late:
+        return f"its reader took more than {limits.seconds:g} s; {DAMAGED}"
+    if status == -signal.SIGXCPU:
         return (
             f"its reader took more than {limits.cpu_seconds} s of computing; {DAMAGED}"
         )
