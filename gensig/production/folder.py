@@ -128,7 +128,7 @@ def run_folder(
     complete only without such a line
     """
     out = out.resolve()
-    with folder_kept(out):
+    with folder_kept(out), at_work(out / SHARDS, others=not executor.closes):
         _join(out, asked, closes=executor.closes)
         return _run_shards(out, executor, on_shard, counts)
 
@@ -275,9 +275,10 @@ def close_folder(out: Path) -> int:
 
     Raises
     ------
-    DatasetError    when a shard is missing, which is named
+    DatasetError    when a shard is missing, which is named, and while a task is at work
     """
     joined_folder(out)
-    collect_receipts(out)
-    _close(out)
+    with at_work(out / SHARDS, others=False):
+        collect_receipts(out)
+        _close(out)
     return read_manifest(out).n_failed

@@ -53,6 +53,45 @@ def locked(folder: Path) -> Iterator[None]:
         os.close(descriptor)
 
 
+@contextmanager
+def at_work(folder: Path, *, others: bool) -> Iterator[None]:
+    """Keep other local processes from making the files of the same folder.
+
+    A lock ends with its process and leaves no file. A folder that does not exist is not locked.
+
+    Parameters
+    ----------
+    folder : one that `locked` does not lock, such as that of the shards
+    others : True allows those that allow others too, as the tasks of an array job do
+
+    Raises
+    ------
+    DatasetError    where another process is at work
+    """
+    if not folder.is_dir():
+        yield
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    kind = fcntl.LOCK_SH if others else fcntl.LOCK_EX
+    try:
+        _lock_at_once(descriptor, kind, folder)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _lock_at_once(descriptor: int, kind: int, folder: Path) -> None:
+    try:
+        fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise DatasetError(
+            f"another process is at work in {folder}; wait until it ends, or stop it"
+        ) from error
+    except OSError:
+        # On a file system without locks, one run at a time is the caller's duty.
+        return
+
+
 def sync_folder(folder: Path) -> None:
     """Make the names in a folder survive a power cut."""
     descriptor = os.open(folder, os.O_RDONLY)
