@@ -13,6 +13,7 @@ from gensig.dataset.folder.closing import finalize
 from gensig.dataset.folder.failures import commonest, failure_reasons
 from gensig.dataset.folder.joining import agreed_folder, joined_folder
 from gensig.dataset.folder.layout import (
+    SHARDS,
     Manifest,
     ShardEntry,
     read_manifest,
@@ -27,6 +28,7 @@ from gensig.dataset.folder.quick_check import size_problem
 from gensig.dataset.folder.run_log import log
 from gensig.dataset.plan import Plan
 from gensig.dataset.schema import SAMPLE_TYPES
+from gensig.dataset.storage.atomic import at_work
 from gensig.dataset.storage.compression import COMPRESSIONS, creation_options
 from gensig.dataset.storage.receipts import (
     collect_receipts,

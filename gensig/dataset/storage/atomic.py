@@ -61,7 +61,7 @@ def at_work(folder: Path, *, others: bool) -> Iterator[None]:
 
     Parameters
     ----------
-    folder : one that `locked` does not lock, such as that of the shards
+    folder : of the shards, since `locked` is for the data set's
     others : True allows those that allow others too, as the tasks of an array job do
 
     Raises
@@ -85,7 +85,7 @@ def _lock_at_once(descriptor: int, kind: int, folder: Path) -> None:
         fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
     except BlockingIOError as error:
         raise DatasetError(
-            f"another process is at work in {folder}; wait until it ends, or stop it"
+            f"another process is at work in {folder.parent}; wait until it ends, or stop it"
         ) from error
     except OSError:
         # On a file system without locks, one run at a time is the caller's duty.
