@@ -105,7 +105,9 @@ def environment_with(wheel: Path, folder: Path) -> Path:
         "--no-deps",
         "--no-compile",
     ]
-    subprocess.run([*command, str(wheel)], check=True, capture_output=True)
+    subprocess.run(
+        [*command, str(wheel)], check=True, capture_output=True, env=ENVIRONMENT
+    )
     # A path line does not read the .pth files of its folder, so the editable gensig stays unseen.
     (site_packages(python) / "test_environment.pth").write_text(
         sysconfig.get_paths()["purelib"] + "\n"
