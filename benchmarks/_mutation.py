@@ -64,7 +64,6 @@ FUNCTIONS = {
 }
 BUILT_IN = ("min", "max", "any", "all")
 AXES = {0: 1, 1: 0, -1: 0}
-NEUTRAL = {"bool": "False", "str": "''"}
 ZEROED = ("Array", "FloatArray", "float", "int")
 HIDDEN_FUNCTIONS = ("__repr__", "__str__")
 HIDDEN = (ast.Raise, ast.Assert, ast.JoinedStr, ast.Import, ast.ImportFrom)
@@ -221,14 +220,14 @@ def arguments(node: ast.AST, around: ast.FunctionDef | None) -> Changed:
 
 
 def result(node: ast.AST, around: ast.FunctionDef | None) -> Changed:
-    """A neutral result: zero, false or an empty text, by the annotation of the function."""
+    """A neutral result, zero or false, by the annotation of the function."""
     if not isinstance(node, ast.Return) or node.value is None or around is None:
         return
     if around.returns is None or isinstance(node.value, ast.Constant):
         return
     annotation = ast.unparse(around.returns)
-    if annotation in NEUTRAL:
-        yield ast.Return(ast.parse(NEUTRAL[annotation], mode="eval").body)
+    if annotation == "bool":
+        yield ast.Return(ast.Constant(False))
     if annotation in ZEROED:
         yield ast.Return(ast.BinOp(ast.Constant(0), ast.Mult(), node.value))
 

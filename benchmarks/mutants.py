@@ -170,11 +170,14 @@ def fixed_mutants(root: Path) -> list[Mutant]:
 def drawn_mutants(
     root: Path, seed: int, packages: Sequence[str] = PACKAGES
 ) -> Iterator[Mutant]:
-    """Mutants without end: packages in turn, of each a module, of it an operator, then a site."""
-    rng = random.Random(seed)
+    """Mutants without end: packages in turn, of each a module, of it an operator, then a site.
+
+    Each is drawn apart, so that a change of one module leaves the mutants of others as they are.
+    """
     modules = {package: _modules(root, package) for package in packages}
     seen = set()
     for number in range(MOST_SITES_TRIED):
+        rng = random.Random(f"{seed}/{number}")
         module = rng.choice(modules[packages[number % len(packages)]])
         by_operator = defaultdict(list)
         for site in sites((root / module).read_text(encoding="utf-8")):
