@@ -39,8 +39,11 @@ LEFT_OUT = (
     "tests/pipeline/test_realism_tool.py",
     "tests/pipeline/test_tour.py",
 )
-MOST_FILES = 12  # of tests for one mutant, the nearest first
+MOST_FILES = 20  # of tests for one mutant, the nearest first
 FARTHEST = 3  # imports between a test and the mutated module
+ALIKE = (
+    0.8  # likeness from which a test counts without imports, as its fixtures have them
+)
 SECONDS_A_TEST = 240  # a longer test hangs; the first may compile the kernels
 SECONDS_A_MUTANT = 900  # for all its tests
 KILLER = re.compile(r"^(?:FAILED|ERROR) (tests/\S+?\.py(?:::\w+)*)", re.MULTILINE)
@@ -175,36 +178,46 @@ def _forget(path: Path) -> None:
         compiled.unlink()
 
 
-def nearest_tests(root: Path, name: str) -> list[str]:
+def nearest_tests(root: Path, name: str, function: str = "") -> list[str]:
     """Test files for a module, the most likely to notice a change first.
 
     Parameters
     ----------
     root : folder of the project
     name : path of the module, relative to it
+    function : qualified name of what changes in it
 
-    A file ranks by the imports between it and the module, by their names, and by its folder
-    below ``tests/unit``. Tests of whole commands come last.
+    A file ranks by the imports between it and the module, by their names and folders, and by its
+    mention of the function or its class. Tests of whole commands come last, unless they import
+    the module themselves.
     """
     module = _dotted(name)
     ranks = {}
     for test, imported in _imports_of_tests(root).items():
-        distance = _distance(root, imported, module)
-        if distance <= FARTHEST and not test.startswith(LEFT_OUT):
-            ranks[test] = (
-                test.startswith("tests/pipeline"),
-                -_likeness(test, name, distance),
-            )
-    return sorted(ranks, key=lambda test: (ranks[test], test))[:MOST_FILES]
+        distance, likeness = _distance(root, imported, module), _likeness(test, name)
+        is_far = distance > FARTHEST and likeness < ALIKE
+        if is_far or test.startswith(LEFT_OUT):
+            continue
+        is_late = distance > 1 and test.startswith("tests/pipeline")
+        nearness = likeness + 1.0 / distance
+        nearness += 1.0 * _mentions(root / test, function)
+        ranks[test] = is_late, -nearness, test
+    return sorted(ranks, key=lambda test: ranks[test])[:MOST_FILES]
 
 
-def _likeness(test: str, name: str, distance: int) -> float:
-    """Nearness of a test file to a module, larger is nearer."""
+def _likeness(test: str, name: str) -> float:
+    """Likeness of the names and folders of a test file and a module, 0 to 1.5."""
     stem = Path(test).stem.removeprefix("test_")
-    alike = difflib.SequenceMatcher(None, stem, Path(name).stem).ratio()
+    names = Path(name).stem, Path(name).parent.name
+    alike = max(difflib.SequenceMatcher(None, stem, other).ratio() for other in names)
     mirrored = Path("tests/unit") / Path(name.removeprefix("gensig/")).parent
-    is_mirrored = Path(test).is_relative_to(mirrored)
-    return alike + 1.0 / distance + 0.5 * is_mirrored
+    return alike + 0.5 * Path(test).is_relative_to(mirrored)
+
+
+def _mentions(path: Path, function: str) -> bool:
+    """True if a file has a part of a qualified name as a word."""
+    words = set(re.findall(r"\w+", path.read_text(encoding="utf-8")))
+    return not words.isdisjoint(part for part in function.split(".") if part)
 
 
 @cache

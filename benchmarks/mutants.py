@@ -223,7 +223,7 @@ def read_reasons(path: Path) -> dict[tuple[str, ...], tuple[str, str]]:
 
 def judge(copy: Copy, mutant: Mutant, commit: str) -> Result:
     """Verdict of the nearest tests on a mutant, in a refreshed copy."""
-    tests = nearest_tests(copy.tree, mutant.file)
+    tests = nearest_tests(copy.tree, mutant.file, mutant.function)
     with copy.changed(mutant.file, mutant.source(copy.tree)):
         outcome = copy.judge(tests)
     verdict, by = SURVIVED, ""
