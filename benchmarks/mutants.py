@@ -31,7 +31,7 @@ import sys
 import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 from benchmarks._fixed_mutants import FIXED
@@ -274,6 +274,25 @@ def write_results(path: Path, results: Sequence[Result], seed: int) -> None:
     path.write_text(f'{{"seed": {seed}, "mutants": [\n{body}\n]}}\n', encoding="utf-8")
 
 
+def with_equivalents(results: Sequence[Result]) -> list[Result]:
+    """Results with survivors as equivalent that the table of reasons calls so.
+
+    Raises
+    ------
+    ValueError    for an equivalent mutant that a test has killed
+    """
+    reasons = read_reasons(REASONS)
+    classified = []
+    for result in results:
+        mutant = result.mutant
+        if reasons.get(mutant.key, ("", ""))[0] == EQUIVALENT:
+            if result.verdict == KILLED:
+                raise ValueError(f"{REASONS.name}: {result.by} kills {mutant}")
+            result = replace(result, verdict=EQUIVALENT)
+        classified.append(result)
+    return classified
+
+
 def table(results: Sequence[Result]) -> str:
     """Killed share by package, as text."""
     by_package: dict[str, Counter[str]] = defaultdict(Counter)
@@ -298,7 +317,8 @@ def campaign(
     reasons = read_reasons(REASONS)
     done = {result.mutant.key for result in earlier}
     if arguments.again:
-        done = {result.mutant.key for result in earlier if result.verdict == KILLED}
+        settled = (KILLED, EQUIVALENT)
+        done = {result.mutant.key for result in earlier if result.verdict in settled}
     commit = _commit(copy.root)
     drawn = drawn_mutants(copy.tree, arguments.seed)
     chosen = [next(drawn) for _ in range(arguments.count)]
@@ -355,7 +375,8 @@ def main() -> int:
     parser.add_argument("--folder", type=Path, help="keeps the copy of the tree")
     parser.add_argument("--json", type=Path, default=RESULTS)
     arguments = parser.parse_args()
-    results = {result.mutant.key: result for result in read_results(arguments.json)}
+    stored = with_equivalents(read_results(arguments.json))
+    results = {result.mutant.key: result for result in stored}
     failing: list[str] = []
     if not arguments.stored:
         with tempfile.TemporaryDirectory(prefix="gensig-mutants-") as name:

@@ -254,11 +254,22 @@ class TestReport:
         results = [result_with(KILLED)] * 99 + [result_with("survived")]
         assert not mutants.report(results)
 
+    def test_an_equivalent_mutant_is_no_survivor_and_never_killed(self, monkeypatch):
+        reasons = {result_with("survived").mutant.key: (EQUIVALENT, "the same")}
+        monkeypatch.setattr(mutants, "read_reasons", lambda _: reasons)
+        others = [result_with("survived", "b"), result_with(KILLED, "c")]
+        results = mutants.with_equivalents([result_with("survived"), *others])
+        assert results == [result_with(EQUIVALENT), *others]
+        with pytest.raises(ValueError, match="kills"):
+            mutants.with_equivalents([result_with(KILLED)])
+
     def test_every_stored_survivor_has_a_reason(self):
         reasons = mutants.read_reasons(mutants.REASONS)
         left = [
             result.mutant
-            for result in mutants.read_results(mutants.RESULTS)
+            for result in mutants.with_equivalents(
+                mutants.read_results(mutants.RESULTS)
+            )
             if result.verdict in ("survived", "unfinished")
         ]
         assert [mutant for mutant in left if mutant.key not in reasons] == []
@@ -274,7 +285,7 @@ def real_copy(tmp_path_factory):
 
 def sample(verdict: str, n: int) -> list[Mutant]:
     """The first stored drawn mutants of a verdict whose code is still there, quick ones first."""
-    results = mutants.read_results(mutants.RESULTS)
+    results = mutants.with_equivalents(mutants.read_results(mutants.RESULTS))
     results.sort(key=lambda result: result.seconds)
     return [
         result.mutant
