@@ -66,6 +66,7 @@ PACKAGES = (
     "diagnose/networks",
 )
 BY_HAND = "by hand"  # operator of the fixed mutants
+LAWS = {bug.name: bug.law for bug in FIXED}
 KILLED, SURVIVED, EQUIVALENT = "killed", "survived", "equivalent"
 UNFINISHED, GAP = "unfinished", "gap"
 
@@ -224,6 +225,9 @@ def read_reasons(path: Path) -> dict[tuple[str, ...], tuple[str, str]]:
 def judge(copy: Copy, mutant: Mutant, commit: str) -> Result:
     """Verdict of the nearest tests on a mutant, in a refreshed copy."""
     tests = nearest_tests(copy.tree, mutant.file, mutant.function)
+    law = LAWS.get(mutant.function, "")
+    if law and (copy.tree / law).exists():
+        tests = list(dict.fromkeys([law, *tests]))
     with copy.changed(mutant.file, mutant.source(copy.tree)):
         outcome = copy.judge(tests)
     verdict, by = SURVIVED, ""
