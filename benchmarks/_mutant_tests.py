@@ -22,6 +22,7 @@ from functools import cache
 from pathlib import Path
 
 PACKAGES = ("gensig", "diagnose")
+ORDER = "_given_order"  # the plugin beside this module
 # Tests of the tree, of the pages, of whole commands and of the campaigns themselves.
 LEFT_OUT = (
     "tests/test_architecture.py",
@@ -79,8 +80,15 @@ class Copy:
         """Folder of the copied files."""
         return self.folder / "tree"
 
+    @property
+    def _plugins(self) -> Path:
+        """Folder of the plugin that keeps the order of the tests."""
+        return self.folder / "plugins"
+
     def refresh(self) -> None:
         """Copy what has changed and remove what is gone; unchanged files keep their time."""
+        self._plugins.mkdir(parents=True, exist_ok=True)
+        shutil.copy(Path(__file__).with_name(f"{ORDER}.py"), self._plugins)
         names = files_of(self.root)
         for name in names:
             source, target = self.root / name, self.tree / name
@@ -113,7 +121,8 @@ class Copy:
     def judge(self, tests: Sequence[str], *, all_of_them: bool = False) -> Outcome:
         """Verdict of test files or tests; ends at the first failure unless ``all_of_them``."""
         begin = time.monotonic()
-        options = ["-q", "-rfE", "--no-header", "--tb=no", "-p", "no:cacheprovider"]
+        options = ["-q", "-rfE", "--no-header", "--tb=no", "-p", ORDER]
+        options += ["-p", "no:cacheprovider"]
         if not all_of_them:
             options.append("-x")
         options += ["-o", f"faulthandler_timeout={SECONDS_A_TEST}"]
@@ -156,7 +165,9 @@ class Copy:
         others = [path for path in given if path and Path(path) != self.root]
         return {
             **os.environ,
-            "PYTHONPATH": os.pathsep.join([str(self.tree), *others]),
+            "PYTHONPATH": os.pathsep.join(
+                [str(self.tree), str(self._plugins), *others]
+            ),
             "NUMBA_CACHE_DIR": str(self.folder / "numba"),
             "OMP_NUM_THREADS": "1",
             "OPENBLAS_NUM_THREADS": "1",

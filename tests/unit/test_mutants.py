@@ -179,6 +179,16 @@ class TestVerdicts:
         assert (result.verdict, result.by, result.n_files) == (KILLED, test, 1)
         assert mutants.failing_without_a_bug(copy, [result]) == []
 
+    def test_the_nearest_tests_come_first_whatever_a_conftest_sorts(
+        self, copy, mutant_of
+    ):
+        (copy.tree / "conftest.py").write_text(
+            "def pytest_collection_modifyitems(items):\n    items.reverse()\n"
+        )
+        with copy.changed("gensig/ratios.py", "def ratio(a, b): ...\nuntil = ratio\n"):
+            outcome = copy.judge(["tests/unit/test_ratios.py"])
+        assert outcome.test.endswith("::test_a_ratio_is_never_below_one")
+
     def test_a_change_of_no_consequence_survives(self, copy, mutant_of):
         result = mutants.judge(copy, mutant_of("a < b", "a <= b"), "")
         assert (result.verdict, result.by) == ("survived", "")
