@@ -23,7 +23,7 @@ from pathlib import Path
 
 PACKAGES = ("gensig", "diagnose")
 ORDER = "_given_order"  # the plugin beside this module
-# Tests of the tree, of the pages, of whole commands and of the campaigns themselves.
+# Tests of the tree, of the pages and of the campaigns themselves.
 LEFT_OUT = (
     "tests/test_architecture.py",
     "tests/unit/docs/",
@@ -31,7 +31,6 @@ LEFT_OUT = (
     "tests/unit/test_mutants.py",
     "tests/unit/dataset/test_fuzz.py",
     "tests/unit/dynamics/test_compiled_cache.py",
-    "tests/pipeline/commands/",
     "tests/pipeline/test_bridge_tool.py",
     "tests/pipeline/test_crash_safety.py",
     "tests/pipeline/test_docs_python.py",
@@ -40,6 +39,11 @@ LEFT_OUT = (
     "tests/pipeline/test_realism_tool.py",
     "tests/pipeline/test_tour.py",
 )
+COMMANDS = "tests/pipeline"
+FOLDERS = {  # of tests, of packages that have none below tests/unit
+    "gensig/production": COMMANDS,
+    "gensig/record": COMMANDS,
+}
 MOST_FILES = 20  # of tests for one mutant, the nearest first
 FARTHEST = 3  # imports between a test and the mutated module
 ALIKE = (
@@ -202,14 +206,14 @@ def nearest_tests(root: Path, name: str, function: str = "") -> list[str]:
     mention of the function or its class. Tests of whole commands come last, unless they import
     the module themselves.
     """
-    module = _dotted(name)
+    module, folder = _dotted(name), _folder_of_tests(name)
     ranks = {}
     for test, imported in _imports_of_tests(root).items():
         distance, likeness = _distance(root, imported, module), _likeness(test, name)
         is_far = distance > FARTHEST and likeness < ALIKE
         if is_far or test.startswith(LEFT_OUT):
             continue
-        is_late = distance > 1 and test.startswith("tests/pipeline")
+        is_late = test.startswith(COMMANDS) and folder != COMMANDS and distance > 1
         nearness = likeness + 1.0 / distance
         nearness += 1.0 * _mentions(root / test, function)
         ranks[test] = is_late, -nearness, test
@@ -221,8 +225,13 @@ def _likeness(test: str, name: str) -> float:
     stem = Path(test).stem.removeprefix("test_")
     names = Path(name).stem, Path(name).parent.name
     alike = max(difflib.SequenceMatcher(None, stem, other).ratio() for other in names)
-    mirrored = Path("tests/unit") / Path(name.removeprefix("gensig/")).parent
-    return alike + 0.5 * Path(test).is_relative_to(mirrored)
+    return alike + 0.5 * Path(test).is_relative_to(_folder_of_tests(name))
+
+
+def _folder_of_tests(name: str) -> str:
+    """Folder of the tests of a module."""
+    package = Path(name).parent.as_posix()
+    return FOLDERS.get(package, f"tests/unit/{package.removeprefix('gensig/')}")
 
 
 def _mentions(path: Path, function: str) -> bool:
