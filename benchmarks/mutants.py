@@ -386,9 +386,7 @@ def main() -> int:
         with tempfile.TemporaryDirectory(prefix="gensig-mutants-") as name:
             copy = Copy(root=ROOT, folder=(arguments.folder or Path(name)).resolve())
             copy.refresh()
-            fresh = []
             for result in campaign(copy, arguments, list(results.values())):
-                fresh.append(result)
                 results[result.mutant.key] = result
                 write_results(arguments.json, list(results.values()), arguments.seed)
                 mutant = result.mutant
@@ -398,7 +396,7 @@ def main() -> int:
                     f" {result.by}",
                     flush=True,
                 )
-            failing = failing_without_a_bug(copy, fresh)
+            failing = failing_without_a_bug(copy, list(results.values()))
     for test in failing:
         print(f"fails without a bug: {test}")
     reached = report(list(results.values()))
