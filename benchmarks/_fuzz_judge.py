@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._mutants import Mutant, mutate
+from benchmarks._damaged_folders import Mutant, mutate
 from gensig.dataset.folder.inspection import inspect
 from gensig.dataset.folder.layout import read_manifest
 from gensig.dataset.folder.verify import verify

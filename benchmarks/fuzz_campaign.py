@@ -1,8 +1,8 @@
 """Mutated data sets against everything that reads: ``python -m benchmarks.fuzz_campaign``.
 
-Each mutant is a small data set with one change (`benchmarks._mutants`): damaged bytes, forged
-shards, manifests and tables. None may crash or hang the reader, fill its memory, make it look
-outside the folder, or pass in silence. ``--mutants`` is their number, ``--first`` the first
+Each mutant is a small data set with one change (`benchmarks._damaged_folders`): damaged bytes,
+forged shards, manifests and tables. None may crash or hang the reader, fill its memory, make it
+look outside the folder, or pass in silence. ``--mutants`` is their number, ``--first`` the first
 seed, ``--folder`` a data set to mutate instead of a new one, ``--json FILE`` writes the
 figures. The exit status is 1 where any mutant did harm.
 """

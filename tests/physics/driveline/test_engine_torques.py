@@ -233,6 +233,11 @@ def test_torques_that_contradict_the_pressure_are_refused(tmp_path):
         ),
         (
             "throw_nodes",
+            [13, 13, 11, 10, 9, 8, 7, 6, 5, 4],
+            "excitation.throw_nodes has 9 different nodes for 10 throws",
+        ),
+        (
+            "throw_nodes",
             [99, 12, 11, 10, 9, 8, 7, 6, 5, 4],
             "excitation.throw_nodes: the shaft line has no node 99",
         ),

@@ -10,8 +10,8 @@ import pytest
 from dataset_samples import build, make_plan
 
 from benchmarks import _fuzz_judge
+from benchmarks._damaged_folders import SECRET, STRUCTURES, Mutant
 from benchmarks._fuzz_judge import verdicts
-from benchmarks._mutants import SECRET, STRUCTURES, Mutant
 from gensig.dataset.folder.inspection import inspect
 
 # Every forbidden structure and every forgery of a manifest once; the campaign tries thousands.

@@ -1,12 +1,16 @@
 """Names of the gears of a drive line, their speeds and their home meshes."""
 
+import warnings
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from closeness import assert_close
 
 from gensig.driveline.drive_line import read_drive_line
 from gensig.driveline.line_gears import gear_names, line_bodies, pinion_turns, slug
+from gensig.driveline.machine_checks import FAR_ABOVE, warn_of_supports
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 from gensig.systems.base import further_gears, home_meshes
@@ -81,3 +85,20 @@ def test_a_gear_is_at_home_in_the_followed_mesh_or_in_its_first_one():
     assert set(drives) == set(machine.gears) - {"pinion", "wheel"}
     assert drives["crankshaft_gear"]
     assert not drives["idler_gear"]
+
+
+def test_loads_far_above_those_of_the_supports_are_told():
+    """The lighter rated gear of a mesh decides; the limit itself is not above it."""
+    mesh = SimpleNamespace(driving=0, driven=1)
+    drive = SimpleNamespace(
+        name="a line",
+        support_forces=(200.0, 100.0),
+        line=SimpleNamespace(meshes=(mesh,)),
+    )
+    engine = SimpleNamespace(drive=drive, mesh_names=("a mesh",))
+    limit = FAR_ABOVE * 100.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_supports(engine, np.array([limit]))
+    with pytest.warns(UserWarning, match="a mesh 301 N for 100 N"):
+        warn_of_supports(engine, np.array([-1.0 - limit]))

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.errors import GeometryError
+from gensig.geometry.tooth import healthy_tooth
 from gensig.geometry.tooth_profile import load_angle, root_curve_point, tooth_profile
 
 # spur reference (docs/validation.md), section 1, m = 2 mm, 20 deg, no shift
@@ -148,3 +149,15 @@ def test_a_rack_tip_wider_than_the_space_is_refused(gear_with):
     assert gear_with(
         n_teeth=40, pressure_angle=math.radians(25.0), cutter_tip_radius_coefficient=0.3
     )
+
+
+def test_a_sliced_tooth_is_split_on_its_whole_face(xiamen):
+    """In two steps as in one; what is missing stays where it is."""
+    sound = healthy_tooth(xiamen.pair.pinion)
+    width = sound.slice_edges[-1]
+    first, second = np.array([0.25]) * width, np.array([-0.1, 0.1, 0.75, 1.2]) * width
+    lost = sound.split(first).with_loss(np.array([[0.0], [1e-4]]))
+    tooth = lost.split(second)
+
+    assert_allclose(tooth.slice_edges, np.array([0.0, 0.1, 0.25, 0.75, 1.0]) * width)
+    assert_allclose(tooth.material_loss[:, 0], [0.0, 0.0, 1e-4, 1e-4])

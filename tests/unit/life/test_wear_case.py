@@ -21,6 +21,7 @@ from gensig.life.wear.archard import (
     hunting_turns,
     worn_curvature,
 )
+from gensig.life.wear.wear_growth import WearGrowth, WearTable
 from gensig.life.wear.wear_life import wear_life
 from gensig.options.compose import compose
 from gensig.systems.wear import read_wear_case, wear_fault
@@ -251,3 +252,14 @@ def test_values_of_a_gear_override_those_of_both():
         6.25e-6 / (200 * hbs),
     )
     assert_allclose(options.hardness_of("pinion"), 187 * hbs)
+
+
+def test_growth_at_a_torque_of_its_table_is_that_life():
+    """At the first, the middle and the last torque, which no power of the torque joins."""
+    sizes, torque = np.array([0.0, 1e-6, 3e-6]), np.array([10.0, 20.0, 80.0])
+    turns = np.array([[0.0, 9e6, 2e7], [0.0, 1e6, 4e6], [0.0, 8e5, 1e6]])
+    table = WearTable(torque=torque, lives=(), reached=(), sizes=sizes, turns=turns)
+    law = WearGrowth(table=table, torque=20.0, as_fault=dict)
+    inside = np.array([0.5e-6, 2e-6])
+    for at, life in zip(torque, turns, strict=True):
+        assert_allclose(law.rate(inside, at), np.diff(sizes) / np.diff(life))

@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closeness import assert_close
+from fault_cases import one
 from scipy.integrate import quad
 
 from gensig.errors import ExtrapolationError
+from gensig.faults.base import faulty_teeth
 from gensig.geometry.tooth import healthy_tooth
 from gensig.geometry.tooth_profile import (
     involute_point,
@@ -105,3 +107,16 @@ class TestRangeOfTheBodyFit:
             body_coefficients(gear, allow_extrapolation=False)
         with pytest.warns(ExtrapolationWarning):
             assert body_coefficients(gear, allow_extrapolation=True)
+
+
+def test_a_crack_softens_its_tooth_unless_its_sections_are_left_whole(xiamen):
+    crack = one("crack", tooth=0, crack_depth_mm=1.0)
+    pair, material = xiamen.pair, xiamen.material
+    cracked = faulty_teeth(pair, (crack,))[("pinion", crack.tooth)]
+
+    def total(tooth, **options):
+        return tooth_compliance(tooth, CURVATURE, material, **options).total
+
+    sound = total(healthy_tooth(pair.pinion))
+    assert (total(cracked) > 1.01 * sound).all()
+    assert_close(total(cracked, papers_crack=False), sound, 1e-12)

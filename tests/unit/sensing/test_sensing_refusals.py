@@ -86,6 +86,11 @@ REFUSED = {
 }
 
 
+def test_a_low_cutoff_may_be_a_tenth_of_the_sampling_rate():
+    changes = {"sampling_rate_hz": 1000, "sensor.low_cutoff_hz": 100}
+    assert read_sensing(changed(OPTIONS["bearing"], changes)).sensor.low_cutoff == 100
+
+
 @pytest.mark.parametrize("typed", REFUSED)
 def test_a_mistake_is_one_line(typed):
     option, words = typed.split(" ", 1)

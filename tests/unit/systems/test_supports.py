@@ -2,13 +2,15 @@
 
 import math
 from collections import Counter, defaultdict
+from dataclasses import replace
 from math import tau
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from closeness import assert_close
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from refusals import refused
 
 from gensig.dynamics.bearing import support_stiffness
@@ -26,7 +28,7 @@ from gensig.sensing.manufacturing import (
 from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run
-from gensig.systems.supports import DAMPING_RATIO, read_holding
+from gensig.systems.supports import DAMPING_RATIO, in_gearbox, read_holding
 
 LOW, HIGH = "quality.support_damping_ratio_low", "quality.support_damping_ratio_high"
 RATIOS = {LOW: 0.01, HIGH: 0.1}
@@ -319,3 +321,32 @@ REFUSED = [
 def test_refusals(config_with, changes, text):
     with refused(text):
         read_system(config_with(changes))
+
+
+def test_axial_and_tilt_supports_scatter_by_the_mean_of_both_radial_ones(xiamen):
+    held = replace(
+        xiamen.pinion.support,
+        stiffness_z=1e8,
+        damping_z=100.0,
+        stiffness_tilt=4e4,
+        damping_tilt=0.5,
+    )
+    gearbox = SimpleNamespace(
+        stiffness_factor=np.array([1.0, 1.0, 2.0, 8.0]),
+        damping_factor=np.array([1.0, 1.0, 0.5, 0.125]),
+        damping_ratio=None,
+    )
+    drawn = in_gearbox(
+        replace(xiamen.pinion, support=held),
+        gearbox,
+        slice(2, 4),
+        SimpleNamespace(support_damping_ratio=None),
+    ).support
+
+    factors = {"stiffness_x": 2.0, "stiffness_y": 8.0, "damping_x": 0.5}
+    factors |= {"damping_y": 0.125, "stiffness_z": 4.0, "stiffness_tilt": 4.0}
+    factors |= {"damping_z": 0.25, "damping_tilt": 0.25}
+    for name, factor in factors.items():
+        assert_allclose(
+            getattr(drawn, name), factor * getattr(held, name), err_msg=name
+        )

@@ -20,6 +20,7 @@ import gensig.dataset.exports.export_tables as tables_module
 import gensig.dataset.exports.hugging_face as hub_module
 from gensig.cli import main
 from gensig.dataset.exports.export import FORMATS, export
+from gensig.dataset.exports.hub_card import OF_SHARDS
 from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.reader import open_dataset
 from gensig.dataset.splitting.protocols import PROTOCOLS
@@ -201,6 +202,13 @@ def test_large_subsets_are_several_files(stored, tmp_path, monkeypatch):
     assert made["records"] == sum(n_rows) == 144 - 3
     train = loaded["train"]["record_id"][:]
     assert train == sorted(of_split(stored, "by_unit")[0])
+
+
+def test_card_is_silent_about_shards_that_an_export_has_not(hub):
+    card = (hub / "README.md").read_text(encoding="utf-8")
+    assert "| records |" in card
+    for fact in OF_SHARDS:
+        assert f"| {fact} |" not in card
 
 
 def test_card_states_sizes_and_warns_of_the_leak(hub):

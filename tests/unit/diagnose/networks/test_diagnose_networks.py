@@ -52,6 +52,19 @@ def test_wdcnn_has_the_published_sizes():
     assert sum(parameter.numel() for parameter in model.parameters()) == expected
 
 
+def test_features_of_the_cnn_do_not_grow_with_the_window():
+    """The mean features of a window are the means of those of its halves."""
+    model = make_model("cnn")
+    window = torch.from_numpy(np.random.default_rng(0).normal(size=(1, 1, 2**15)))
+    halves = window.float().reshape(2, 1, -1)
+    with torch.no_grad():
+        whole, of_halves = model.look(window.float())[0][0], model.look(halves)[0]
+    n = len(whole) // 2
+
+    assert whole[:n].abs().max() > 0.01
+    assert_allclose(whole[:n], of_halves[:, :n].mean(dim=0), rtol=0.02, atol=1e-3)
+
+
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("shape", [(1, 1024), (4, 6400), (2, 5001)])
 def test_scores_have_their_shape_for_any_window(name, shape):

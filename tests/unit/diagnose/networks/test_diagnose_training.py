@@ -1,13 +1,18 @@
 """Training finds a visible fault, and nothing with shuffled labels."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+import torch
 from fake_dataset import FakeDataset
+from numpy.testing import assert_allclose
 from small_studies import LEARNS, run, study_of, windows_of
 
 from diagnose.studies.jobs import Job
 from diagnose.studies.study import plan_study, score_predictions
 from diagnose.training.classes import with_shuffled_labels
+from diagnose.training.train import _Descent
 from gensig.errors import ConfigError
 
 MODEL = [
@@ -81,3 +86,20 @@ def test_a_part_with_one_class_is_refused():
     dataset.usable[48:] = dataset.columns["label"][48:] == 1
     with pytest.raises(ConfigError, match=r"one class only in its test part \(crack\)"):
         plan_study(*study_of(dataset))
+
+
+def test_the_learning_rate_rises_for_15_percent_of_the_steps_and_falls_to_nothing():
+    settings = SimpleNamespace(learning_rate=0.01, weight_decay=0.0)
+    model = torch.nn.Linear(1, 1)
+    descent = _Descent(model, settings, 1000)
+    rates = []
+    for _ in range(1000):
+        rates.append(descent.optimizer.param_groups[0]["lr"])
+        descent.step(model(torch.ones(1)).sum())
+
+    assert_allclose(max(rates), 0.01)
+    greatest = int(np.argmax(rates))
+    assert abs(greatest - 150) <= 1
+    assert (np.diff(rates[: greatest + 1]) > 0).all()
+    assert (np.diff(rates[greatest:]) < 0).all()
+    assert rates[-1] < 1e-6 * 0.01 + 1e-7

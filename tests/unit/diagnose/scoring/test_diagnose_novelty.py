@@ -10,13 +10,14 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from refusals import refused
 from runs import rows_of
-from scipy.special import log_softmax
+from scipy.special import log_softmax, logsumexp, softmax
 from scipy.stats import norm
 from small_studies import LEARNS, TINY_CNN, run, study_of, train, windows_of
 
-from diagnose.data.windows import subset_segments
+from diagnose.data.windows import SUBSETS, subset_segments
+from diagnose.studies import novelty
 from diagnose.studies.jobs import Job
-from diagnose.studies.novelty import NoveltyRun, network_outputs
+from diagnose.studies.novelty import NoveltyRun, network_outputs, trained_runs
 from diagnose.studies.novelty_metrics import (
     alarm_threshold,
     false_positive_rate_95,
@@ -237,6 +238,36 @@ def test_features_and_outputs_are_those_of_the_last_layer(open_study):
     scaled = log_softmax(logits, axis=1)
     expected = predict_windows(model, validation)
     assert_allclose(expected, scaled, rtol=1e-4, atol=1e-5)
+
+
+def test_scores_of_a_classifier_are_those_of_its_probabilities_and_outputs(
+    open_study, monkeypatch
+):
+    """Doubt is 1 - the largest calibrated probability, energy -log of the sum of exponents."""
+    task, settings = open_study
+    trainings = []
+
+    def remembered(*parts, **options):
+        trainings.append(train_network(*parts, **options))
+        return trainings[-1]
+
+    monkeypatch.setattr(novelty, "train_network", remembered)
+    sets = dict(zip(SUBSETS, windows_of(task, *SUBSETS), strict=True))
+    runs = {run.method: run for run in trained_runs(settings, "open_set", 0, sets)}
+    (training,) = trainings
+    test = sets["test"]
+    doubt, energy = [], []
+    _, logits = network_outputs(training.model, test, np.arange(len(test)))
+    for record in runs["energy"].record:
+        of_record = logits[test.record == record]
+        mean = log_softmax(of_record, axis=1).mean(axis=0)
+        probability = softmax(mean / training.temperature)
+        doubt.append(1.0 - probability.max())
+        energy.append(-logsumexp(of_record, axis=1).mean())
+
+    assert np.ptp(doubt) > 1e-3
+    assert_allclose(runs["largest_probability"].score, doubt, atol=1e-5)
+    assert_allclose(runs["energy"].score, energy, rtol=1e-4)
 
 
 @pytest.mark.parametrize(

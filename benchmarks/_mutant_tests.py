@@ -1,0 +1,312 @@
+"""Tests that should notice a change of a module, and their verdict in a copy of the tree.
+
+The copy holds the files that git knows. Its folder stays between calls, so that Numba compiles
+once. The files of the project itself are never written.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+PACKAGES = ("gensig", "diagnose")
+ORDER = "_given_order"  # the plugin beside this module
+# Tests of the tree, of the pages and of the campaigns themselves.
+LEFT_OUT = (
+    "tests/test_architecture.py",
+    "tests/unit/docs/",
+    "tests/unit/test_benchmark_stages.py",
+    "tests/unit/test_mutants.py",
+    "tests/unit/dataset/test_fuzz.py",
+    "tests/unit/dynamics/test_compiled_cache.py",
+    "tests/pipeline/test_bridge_tool.py",
+    "tests/pipeline/test_crash_safety.py",
+    "tests/pipeline/test_docs_python.py",
+    "tests/pipeline/test_packaging.py",
+    "tests/pipeline/test_readme.py",
+    "tests/pipeline/test_realism_tool.py",
+    "tests/pipeline/test_tour.py",
+)
+COMMANDS = "tests/pipeline"
+FOLDERS = {  # of tests, of packages that have none below tests/unit
+    "gensig/production": COMMANDS,
+    "gensig/record": COMMANDS,
+}
+MOST_FILES = 20  # of tests for one mutant, the nearest first
+FARTHEST = 3  # imports between a test and the mutated module
+ALIKE = (
+    0.8  # likeness from which a test counts without imports, as its fixtures have them
+)
+SECONDS_A_TEST = 240  # a longer test hangs; the first may compile the kernels
+SECONDS_A_MUTANT = 900  # for all its tests
+KILLER = re.compile(r"^(?:FAILED|ERROR) (tests/\S+?\.py(?:::\w+)*)", re.MULTILINE)
+PASSED, NO_TESTS, WRONG_USE = 0, 5, 4  # exit statuses of pytest
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """Verdict of tests.
+
+    Attributes
+    ----------
+    status : ``passed``, ``failed``, ``hung`` (one test took too long, or the process died) or
+        ``unfinished`` (all passed until the time of the mutant was over)
+    test : the first that failed; '' if none did
+    seconds : wall time
+    """
+
+    status: str
+    test: str
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Copy:
+    """Copy of the tree of a project, in ``folder``; ``root`` is the project's own folder."""
+
+    root: Path
+    folder: Path
+
+    @property
+    def tree(self) -> Path:
+        """Folder of the copied files."""
+        return self.folder / "tree"
+
+    @property
+    def _plugins(self) -> Path:
+        """Folder of the plugin that keeps the order of the tests."""
+        return self.folder / "plugins"
+
+    def refresh(self) -> None:
+        """Copy what has changed and remove what is gone; unchanged files keep their time."""
+        self._plugins.mkdir(parents=True, exist_ok=True)
+        shutil.copy(Path(__file__).with_name(f"{ORDER}.py"), self._plugins)
+        names = files_of(self.root)
+        for name in names:
+            source, target = self.root / name, self.tree / name
+            if target.exists() and target.read_bytes() == source.read_bytes():
+                continue
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(source, target)
+            _forget(target)
+        for path in self.tree.rglob("*.py"):
+            if path.relative_to(self.tree).as_posix() not in names:
+                path.unlink()
+        where = self._python("-c", "import gensig, diagnose; print(gensig, diagnose)")
+        if where.stdout.count(str(self.tree)) != len(PACKAGES):
+            raise RuntimeError(f"the copy is not what is imported: {where.stdout}")
+
+    @contextmanager
+    def changed(self, name: str, text: str) -> Iterator[None]:
+        """Another text of one file within the block."""
+        path = self.tree / name
+        original, times = path.read_bytes(), path.stat()
+        try:
+            path.write_text(text, encoding="utf-8")
+            _forget(path)
+            yield
+        finally:
+            path.write_bytes(original)
+            os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+            _forget(path)
+
+    def judge(self, tests: Sequence[str], *, all_of_them: bool = False) -> Outcome:
+        """Verdict of test files or tests; ends at the first failure unless ``all_of_them``."""
+        begin = time.monotonic()
+        options = ["-q", "-rfE", "--no-header", "--tb=no", "-p", ORDER]
+        options += ["-p", "no:cacheprovider"]
+        if not all_of_them:
+            options.append("-x")
+        options += ["-o", f"faulthandler_timeout={SECONDS_A_TEST}"]
+        options += ["-o", "faulthandler_exit_on_timeout=true"]
+        done = self._python("-m", "pytest", *options, *tests)
+        seconds = time.monotonic() - begin
+        if done.returncode in (NO_TESTS, WRONG_USE):
+            raise RuntimeError(f"pytest found no tests:\n{done.stdout}{done.stderr}")
+        killer = KILLER.search(done.stdout)
+        if done.returncode == PASSED:
+            return Outcome(status="passed", test="", seconds=seconds)
+        if killer is not None:
+            return Outcome(status="failed", test=killer[1], seconds=seconds)
+        status = "hung"
+        if seconds > SECONDS_A_MUTANT:
+            status = "unfinished"
+        return Outcome(status=status, test="", seconds=seconds)
+
+    def _python(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """An interpreter in the copy; it and its children end with the time of a mutant."""
+        process = subprocess.Popen(
+            [sys.executable, *arguments],
+            cwd=self.tree,
+            env=self._environment(),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        try:
+            out, error = process.communicate(timeout=SECONDS_A_MUTANT)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            out, error = process.communicate()
+        return subprocess.CompletedProcess(process.args, process.returncode, out, error)
+
+    def _environment(self) -> dict[str, str]:
+        """Variables under which the packages of the copy are imported, and compiled apart."""
+        given = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+        others = [path for path in given if path and Path(path) != self.root]
+        return {
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join(
+                [str(self.tree), str(self._plugins), *others]
+            ),
+            "NUMBA_CACHE_DIR": str(self.folder / "numba"),
+            "OMP_NUM_THREADS": "1",
+            "OPENBLAS_NUM_THREADS": "1",
+        }
+
+
+def files_of(root: Path) -> set[str]:
+    """Files of a project that git knows or would add, relative paths."""
+    command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(
+        command, cwd=root, capture_output=True, text=True, check=True
+    )
+    return {name for name in listed.stdout.split("\n") if (root / name).is_file()}
+
+
+def _forget(path: Path) -> None:
+    """Remove the bytecode of a file, which Python knows by whole seconds and size only."""
+    for compiled in (path.parent / "__pycache__").glob(f"{path.stem}.*.pyc"):
+        compiled.unlink()
+
+
+def nearest_tests(root: Path, name: str, function: str = "") -> list[str]:
+    """Test files for a module, the most likely to notice a change first.
+
+    Parameters
+    ----------
+    root : folder of the project
+    name : path of the module, relative to it
+    function : qualified name of what changes in it
+
+    A file ranks by the imports between it and the module, by their names and folders, and by its
+    mention of the function or its class. Tests of whole commands come last, unless they import
+    the module themselves.
+    """
+    module, folder = _dotted(name), _folder_of_tests(name)
+    ranks = {}
+    for test, imported in _imports_of_tests(root).items():
+        distance, likeness = _distance(root, imported, module), _likeness(test, name)
+        is_far = distance > FARTHEST and likeness < ALIKE
+        if is_far or test.startswith(LEFT_OUT):
+            continue
+        is_late = test.startswith(COMMANDS) and folder != COMMANDS and distance > 1
+        nearness = likeness + 1.0 / distance
+        nearness += 1.0 * _mentions(root / test, function)
+        ranks[test] = is_late, -nearness, test
+    return sorted(ranks, key=lambda test: ranks[test])[:MOST_FILES]
+
+
+def _likeness(test: str, name: str) -> float:
+    """Likeness of the names and folders of a test file and a module, 0 to 1.5."""
+    stem = Path(test).stem.removeprefix("test_")
+    names = Path(name).stem, Path(name).parent.name
+    alike = max(difflib.SequenceMatcher(None, stem, other).ratio() for other in names)
+    return alike + 0.5 * Path(test).is_relative_to(_folder_of_tests(name))
+
+
+def _folder_of_tests(name: str) -> str:
+    """Folder of the tests of a module."""
+    package = Path(name).parent.as_posix()
+    return FOLDERS.get(package, f"tests/unit/{package.removeprefix('gensig/')}")
+
+
+def _mentions(path: Path, function: str) -> bool:
+    """True if a file has a part of a qualified name as a word."""
+    words = set(re.findall(r"\w+", path.read_text(encoding="utf-8")))
+    return not words.isdisjoint(part for part in function.split(".") if part)
+
+
+@cache
+def _imports_of_tests(root: Path) -> dict[str, frozenset[str]]:
+    """Test file -> modules of the project that it imports, by itself or through its helpers."""
+    folder = root / "tests"
+    helpers = {path.stem: path for path in folder.rglob("*.py")}
+
+    def reached(path: Path, seen: set[Path]) -> set[str]:
+        names = set()
+        for imported in _imports(path):
+            if imported.split(".")[0] in PACKAGES:
+                names.add(imported)
+                continue
+            helper = helpers.get(imported.rpartition(".")[2])
+            if helper is not None and helper not in seen:
+                seen.add(helper)
+                names |= reached(helper, seen)
+        return names
+
+    result = {}
+    for path in sorted(folder.rglob("test_*.py")):
+        imported = reached(path, {path})
+        conftest = path.parent / "conftest.py"
+        if conftest.exists():
+            imported |= reached(conftest, {path})
+        result[path.relative_to(root).as_posix()] = frozenset(imported)
+    return result
+
+
+@cache
+def _imports_of_modules(root: Path) -> dict[str, frozenset[str]]:
+    """Module of the project -> modules that it imports."""
+    return {
+        _dotted(path.relative_to(root).as_posix()): frozenset(_imports(path))
+        for package in PACKAGES
+        for path in (root / package).rglob("*.py")
+    }
+
+
+def _distance(root: Path, imported: frozenset[str], module: str) -> int:
+    """Imports from a test to a module; 1 if it imports the module itself."""
+    modules = _imports_of_modules(root)
+    front, seen = set(imported), set(imported)
+    for distance in range(1, FARTHEST + 1):
+        if module in front:
+            return distance
+        front = {
+            other
+            for name in front
+            for other in modules.get(name, ())
+            if other not in seen
+        }
+        seen |= front
+    return FARTHEST + 1
+
+
+@cache
+def _imports(path: Path) -> frozenset[str]:
+    """Dotted names that a file imports, and those that may be modules of what it imports."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return frozenset(names)
+
+
+def _dotted(name: str) -> str:
+    return name.removesuffix(".py").removesuffix("/__init__").replace("/", ".")

@@ -1,0 +1,407 @@
+"""Small bugs in the code against its tests: ``python -m benchmarks.mutants [--count 150]``.
+
+A mutant is the code with one bug: nine fixed ones (`benchmarks._fixed_mutants`), and others drawn
+by a seed (`benchmarks._mutation`) from the modules of physics, sensing, data sets and learning.
+Kernels are left out, as every change compiles them all. Each mutant lives in a copy of the tree,
+where the nearest test files run until one fails (`benchmarks._mutant_tests`).
+
+Verdicts: ``killed`` (a test failed, or hung), ``survived``, ``unfinished`` (no test failed in the
+time of a mutant), ``equivalent`` (no test can tell it from the code, by
+``mutant_reasons.csv``). That table also has the reason of every survivor. The share of killed
+mutants counts all but the equivalent ones. Tests that killed must pass in the copy without a bug;
+this is checked at the end of every call.
+
+Results are appended to ``--json``, and a further call goes on where the last one ended; its
+entries are of the commit that they name. ``--again`` judges survivors once more. ``--folder``
+keeps the copy. The exit status is 1 below the goal, for a survivor without a reason, and for a
+killing test that fails without a bug.
+
+Own code instead of mutmut or cosmic-ray: those try all mutants of a package against one command,
+while here a few are drawn across two packages and each meets other test files.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import random
+import subprocess
+import sys
+import tempfile
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+
+from benchmarks._fixed_mutants import FIXED
+from benchmarks._mutant_tests import Copy, nearest_tests
+from benchmarks._mutation import Site, mutated_source, sites
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "benchmarks" / "mutants.json"
+REASONS = ROOT / "benchmarks" / "mutant_reasons.csv"
+GOAL = 0.97  # share of the mutants that tests must kill
+MOST_SITES_TRIED = 10000
+PACKAGES = (
+    "gensig/geometry",
+    "gensig/mesh",
+    "gensig/faults",
+    "gensig/dynamics",
+    "gensig/driveline",
+    "gensig/life",
+    "gensig/systems",
+    "gensig/operation",
+    "gensig/sensing",
+    "gensig/signals",
+    "gensig/record",
+    "gensig/plan",
+    "gensig/dataset",
+    "gensig/production",
+    "diagnose/data",
+    "diagnose/baselines",
+    "diagnose/scoring",
+    "diagnose/studies",
+    "diagnose/training",
+    "diagnose/networks",
+)
+BY_HAND = "by hand"  # operator of the fixed mutants
+LAWS = {bug.name: bug.law for bug in FIXED}
+KILLED, SURVIVED, EQUIVALENT = "killed", "survived", "equivalent"
+UNFINISHED, GAP = "unfinished", "gap"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mutant:
+    """The code with one bug.
+
+    Attributes
+    ----------
+    file : path of the module, relative to the project
+    line : number of the changed line, from 1
+    function : qualified name of the function around it; of a fixed mutant the name of the bug
+    operator : of `benchmarks._mutation.OPERATORS`, or ``by hand``
+    text : the line in full, without the spaces around it
+    original, mutated : what changes in it, before and after
+    """
+
+    file: str
+    line: int
+    function: str
+    operator: str
+    text: str
+    original: str
+    mutated: str
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """Identity that a shift of lines leaves alone."""
+        return self.file, self.function, self.text, self.original, self.mutated
+
+    @property
+    def package(self) -> str:
+        """The package of the module, as in `PACKAGES`."""
+        return "/".join(self.file.split("/")[:2])
+
+    def fits(self, root: Path) -> bool:
+        """True if the module has the place of the bug, once."""
+        text = (root / self.file).read_text(encoding="utf-8")
+        if self.operator == BY_HAND:
+            return text.count(self.original) == 1
+        return self.key[1:] in _sites_by_key(text)
+
+    def source(self, root: Path) -> str:
+        """Text of the module with the bug."""
+        text = (root / self.file).read_text(encoding="utf-8")
+        if self.operator == BY_HAND:
+            return text.replace(self.original, self.mutated)
+        return mutated_source(text, _sites_by_key(text)[self.key[1:]])
+
+
+def _sites_by_key(text: str) -> dict[tuple[str, ...], Site]:
+    """Sites of a source text by all of a mutant's key but the file."""
+    return {
+        (site.function, site.text, site.original, site.mutated): site
+        for site in sites(text)
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """Verdict on a mutant.
+
+    Attributes
+    ----------
+    verdict : ``killed``, ``survived``, ``unfinished`` or ``equivalent``
+    by : the test that killed it; ``hung`` if a test took too long; else ''
+    n_files : test files that were run, or begun
+    seconds : wall time of the tests
+    commit : of the code and the tests
+    """
+
+    mutant: Mutant
+    verdict: str
+    by: str
+    n_files: int
+    seconds: float
+    commit: str
+
+
+def fixed_mutants(root: Path) -> list[Mutant]:
+    """The mutants of `benchmarks._fixed_mutants`; raises unless each fits one place."""
+    mutants = []
+    for bug in FIXED:
+        text = (root / bug.file).read_text(encoding="utf-8")
+        line = text.partition(bug.original)[0].count("\n") + 1
+        mutant = Mutant(
+            file=bug.file,
+            line=line,
+            function=bug.name,
+            operator=BY_HAND,
+            text=text.split("\n")[line - 1].strip(),
+            original=bug.original,
+            mutated=bug.mutated,
+        )
+        if not mutant.fits(root):
+            raise ValueError(f"{bug.file} must have '{bug.original}' once: {bug.name}")
+        mutants.append(mutant)
+    return mutants
+
+
+def drawn_mutants(
+    root: Path, seed: int, packages: Sequence[str] = PACKAGES
+) -> Iterator[Mutant]:
+    """Mutants without end: packages in turn, of each a module, of it an operator, then a site.
+
+    Each is drawn apart, so that a change of one module leaves the mutants of others as they are.
+    """
+    modules = {package: _modules(root, package) for package in packages}
+    seen = set()
+    for number in range(MOST_SITES_TRIED):
+        rng = random.Random(f"{seed}/{number}")
+        module = rng.choice(modules[packages[number % len(packages)]])
+        by_operator = defaultdict(list)
+        for site in sites((root / module).read_text(encoding="utf-8")):
+            by_operator[site.operator].append(site)
+        if not by_operator:
+            continue
+        site = rng.choice(by_operator[rng.choice(sorted(by_operator))])
+        mutant = Mutant(
+            file=module,
+            line=site.line,
+            function=site.function,
+            operator=site.operator,
+            text=site.text,
+            original=site.original,
+            mutated=site.mutated,
+        )
+        if mutant.key not in seen:
+            seen.add(mutant.key)
+            yield mutant
+
+
+def _modules(root: Path, package: str) -> list[str]:
+    """Modules of a package that are drawn from: all but private ones, which hold kernels."""
+    paths = sorted((root / package).rglob("*.py"))
+    public = [path for path in paths if not path.stem.startswith("_")]
+    return [path.relative_to(root).as_posix() for path in public]
+
+
+def read_reasons(path: Path) -> dict[tuple[str, ...], tuple[str, str]]:
+    """Key of a mutant -> (``equivalent`` or ``gap``, reason)."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return {
+            tuple(
+                row[name]
+                for name in ("file", "function", "text", "original", "mutated")
+            ): (
+                row["verdict"],
+                row["reason"],
+            )
+            for row in csv.DictReader(file)
+        }
+
+
+def judge(copy: Copy, mutant: Mutant, commit: str) -> Result:
+    """Verdict of the nearest tests on a mutant, in a refreshed copy."""
+    tests = nearest_tests(copy.tree, mutant.file, mutant.function)
+    law = LAWS.get(mutant.function, "")
+    if law and (copy.tree / law).exists():
+        tests = list(dict.fromkeys([law, *tests]))
+    with copy.changed(mutant.file, mutant.source(copy.tree)):
+        outcome = copy.judge(tests)
+    verdict, by = SURVIVED, ""
+    if outcome.status in ("failed", "hung"):
+        verdict, by = KILLED, outcome.test or outcome.status
+    if outcome.status == UNFINISHED:
+        verdict = UNFINISHED
+    n_files = len(tests)
+    if outcome.test:
+        n_files = tests.index(outcome.test.split("::")[0]) + 1
+    return Result(
+        mutant=mutant,
+        verdict=verdict,
+        by=by,
+        n_files=n_files,
+        seconds=round(outcome.seconds, 1),
+        commit=commit,
+    )
+
+
+def failing_without_a_bug(copy: Copy, results: Sequence[Result]) -> list[str]:
+    """Tests that killed and fail in the copy as it is too."""
+    tests = sorted({result.by for result in results if "::" in result.by})
+    failing = []
+    if tests and copy.judge(tests, all_of_them=True).status != "passed":
+        failing = [test for test in tests if copy.judge([test]).status != "passed"]
+    return failing
+
+
+def read_results(path: Path) -> list[Result]:
+    """Results of a file; none if there is no file."""
+    if not path.exists():
+        return []
+    results = []
+    for row in json.loads(path.read_text(encoding="utf-8"))["mutants"]:
+        mutant = Mutant(**{field.name: row.pop(field.name) for field in fields(Mutant)})
+        results.append(Result(mutant=mutant, **row))
+    return results
+
+
+def write_results(path: Path, results: Sequence[Result], seed: int) -> None:
+    """A JSON file with one mutant a line."""
+    rows = []
+    for result in results:
+        row = asdict(result)
+        rows.append(json.dumps({**row.pop("mutant"), **row}))
+    body = ",\n".join(rows)
+    path.write_text(f'{{"seed": {seed}, "mutants": [\n{body}\n]}}\n', encoding="utf-8")
+
+
+def with_equivalents(results: Sequence[Result]) -> list[Result]:
+    """Results with survivors as equivalent that the table of reasons calls so.
+
+    Raises
+    ------
+    ValueError    for an equivalent mutant that a test has killed
+    """
+    reasons = read_reasons(REASONS)
+    classified = []
+    for result in results:
+        mutant = result.mutant
+        if reasons.get(mutant.key, ("", ""))[0] == EQUIVALENT:
+            if result.verdict == KILLED:
+                raise ValueError(f"{REASONS.name}: {result.by} kills {mutant}")
+            result = replace(result, verdict=EQUIVALENT)
+        classified.append(result)
+    return classified
+
+
+def table(results: Sequence[Result]) -> str:
+    """Killed share by package, as text."""
+    by_package: dict[str, Counter[str]] = defaultdict(Counter)
+    for result in results:
+        by_package[result.mutant.package][result.verdict] += 1
+        by_package["all"][result.verdict] += 1
+    lines = [f"{'package':<22}{'killed':>8}{'of':>6}{'share':>8}{'equivalent':>12}"]
+    for package in (*sorted(by_package.keys() - {"all"}), "all"):
+        counts = by_package[package]
+        judged = sum(counts.values()) - counts[EQUIVALENT]
+        share = counts[KILLED] / max(judged, 1)
+        lines.append(
+            f"{package:<22}{counts[KILLED]:>8}{judged:>6}{share:>8.1%}{counts[EQUIVALENT]:>12}"
+        )
+    return "\n".join(lines)
+
+
+def campaign(
+    copy: Copy, arguments: argparse.Namespace, earlier: Sequence[Result]
+) -> Iterator[Result]:
+    """Results of the mutants that have none yet, or are to be judged again."""
+    reasons = read_reasons(REASONS)
+    done = {result.mutant.key for result in earlier}
+    if arguments.again:
+        settled = (KILLED, EQUIVALENT)
+        done = {result.mutant.key for result in earlier if result.verdict in settled}
+    commit = _commit(copy.root)
+    drawn = drawn_mutants(copy.tree, arguments.seed)
+    chosen = [next(drawn) for _ in range(arguments.count)]
+    chosen += fixed_mutants(copy.tree)
+    for mutant in chosen:
+        if mutant.key in done:
+            continue
+        if reasons.get(mutant.key, ("", ""))[0] == EQUIVALENT:
+            yield Result(
+                mutant=mutant,
+                verdict=EQUIVALENT,
+                by="",
+                n_files=0,
+                seconds=0.0,
+                commit=commit,
+            )
+            continue
+        yield judge(copy, mutant, commit)
+
+
+def _commit(root: Path) -> str:
+    command = ["git", "rev-parse", "--short=12", "HEAD"]
+    return subprocess.run(
+        command, cwd=root, capture_output=True, text=True, check=True
+    ).stdout.strip()
+
+
+def report(results: Sequence[Result]) -> bool:
+    """Print survivors with their reasons and the table; True if the goal is reached."""
+    reasons = read_reasons(REASONS)
+    unexplained = False
+    for result in results:
+        if result.verdict in (KILLED, EQUIVALENT):
+            continue
+        mutant = result.mutant
+        reason = reasons.get(mutant.key, ("", "NO REASON GIVEN"))[1]
+        unexplained |= mutant.key not in reasons
+        print(f"{result.verdict}: {mutant.file}:{mutant.line} in {mutant.function}")
+        print(f"    {mutant.original}  ->  {mutant.mutated}\n    {reason}")
+    print(table(results))
+    counts = Counter(result.verdict for result in results)
+    judged = len(results) - counts[EQUIVALENT]
+    return counts[KILLED] >= GOAL * judged and not unexplained
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--count", type=int, default=150, help="drawn mutants")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--again", action="store_true", help="judge survivors again")
+    parser.add_argument("--stored", action="store_true", help="print stored results")
+    parser.add_argument("--folder", type=Path, help="keeps the copy of the tree")
+    parser.add_argument("--json", type=Path, default=RESULTS)
+    arguments = parser.parse_args()
+    stored = with_equivalents(read_results(arguments.json))
+    results = {result.mutant.key: result for result in stored}
+    failing: list[str] = []
+    if not arguments.stored:
+        with tempfile.TemporaryDirectory(prefix="gensig-mutants-") as name:
+            copy = Copy(root=ROOT, folder=(arguments.folder or Path(name)).resolve())
+            copy.refresh()
+            for result in campaign(copy, arguments, list(results.values())):
+                results[result.mutant.key] = result
+                write_results(arguments.json, list(results.values()), arguments.seed)
+                mutant = result.mutant
+                print(
+                    f"{len(results)}: {result.verdict} in {result.seconds:g} s, "
+                    f"{mutant.file}:{mutant.line}: {mutant.original} -> {mutant.mutated}"
+                    f" {result.by}",
+                    flush=True,
+                )
+            failing = failing_without_a_bug(copy, list(results.values()))
+    for test in failing:
+        print(f"fails without a bug: {test}")
+    reached = report(list(results.values()))
+    return int(not reached or bool(failing))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
