@@ -130,7 +130,7 @@ def test_a_manifest_of_another_version_is_refused(many, tmp_path):
     path.write_text(
         path.read_text().replace('"schema_version": 2', '"schema_version": 1')
     )
-    with pytest.raises(DatasetError, match="manifest.json was altered"):
+    with pytest.raises(DatasetError, match=r"manifest\.json was altered"):
         gensig.open_dataset(folder)
     problems = verify(folder).problems
     assert any("has format version 2, the manifest says 1" in line for line in problems)
