@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from small_studies import task_on, train, windows_of
 
 from diagnose.baselines.base import Baseline, MethodText, Parts, Role, Source
+from diagnose.baselines.features import FeatureTable
 from diagnose.baselines.indicator_models import INDICATOR_INPUT
 from diagnose.baselines.registry import BASELINES, baseline_names
 from diagnose.data.windows import SUBSETS
@@ -201,3 +202,19 @@ def missing_on_page(page, baseline):
 def test_it_is_on_the_page(name, study):
     assert name in metrics_of(study)["protocols"]["by_unit"]["methods"]
     assert missing_on_page((study / "report.html").read_text(), BASELINES[name]) == []
+
+
+@pytest.mark.parametrize(
+    ("validation", "judged"), [([0, 1], [0, 1, 4, 5]), ([0, 4], [4, 5])]
+)
+def test_a_record_of_two_subsets_leaves_the_test_alone(validation, judged):
+    def table(records):
+        return FeatureTable(
+            values=np.zeros((len(records), 1)),
+            names=("a",),
+            label=np.zeros(len(records), dtype=int),
+            record=np.array(records),
+        )
+
+    parts = Parts(train=table([2]), validation=table(validation), test=table([4, 5]))
+    assert_array_equal(parts.judged().record, judged)

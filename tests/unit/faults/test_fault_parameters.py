@@ -90,6 +90,7 @@ class TestCompound:
             ({"parts": []}, "fault.parts = [] must be a list of faults"),
             ({"parts": ["crack"]}, "fault.parts = ['crack'] must be a list of faults"),
             ({"parts": CRACK}, "must be a list of faults"),
+            ({"parts": [CRACK, "pitting"]}, "must be a list of faults"),
             ({"parts": [CRACK, {"kind": "crak"}]}, "parts.1.kind = 'crak'; allowed: "),
             ({"parts": [CRACK, {}]}, "fault.parts.1.kind = None; allowed: crack, "),
             ({"parts": [{"kind": COMPOUND}]}, "fault.parts.0.kind = 'compound'"),

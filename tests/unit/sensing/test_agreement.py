@@ -216,3 +216,11 @@ class TestAgreement:
         )
         assert_allclose(lower[1:], upper[:-1])
         assert_allclose(upper[-1], 20_000)
+
+
+def test_both_limits_belong_to_what_agrees():
+    more = 1.0 + 1e-12
+    of_bands = np.array([1.0, more, 1.0, np.nan]) * THIRD_OCTAVE_DB
+    of_indicators = np.array([1.0, 1.0, more, 1.0]) * INDICATORS
+    result = Agreement(third_octave_db=of_bands, indicators=of_indicators)
+    assert result.agrees.tolist() == [True, False, False, False]

@@ -145,3 +145,8 @@ def test_a_run_up_that_has_no_orders_is_refused_with_its_numbers(angle, words):
 def test_a_frame_longer_than_the_record_is_refused():
     with pytest.raises(ValueError, match="shorter than a frame of 30 s"):
         frequency_map(np.zeros(TIME.size), ANGLE, RATE, frame=30.0)
+
+
+def test_ten_times_the_reference_is_20_db():
+    levels = decibels([0.0, 1e-6, 2e-6, 1e-5], 1e-6)
+    assert_allclose(levels, [-np.inf, 0.0, 6.0206, 20.0], atol=1e-4)
