@@ -40,10 +40,8 @@ LEFT_OUT = (
     "tests/pipeline/test_tour.py",
 )
 COMMANDS = "tests/pipeline"
-FOLDERS = {  # of tests, of packages that have none below tests/unit
-    "gensig/production": COMMANDS,
-    "gensig/record": COMMANDS,
-}
+# folder of tests of a package that has none below tests/unit
+FOLDERS = {"gensig/production": COMMANDS}
 MOST_FILES = 20  # of tests for one mutant, the nearest first
 FARTHEST = 3  # imports between a test and the mutated module
 ALIKE = (
