@@ -19,7 +19,7 @@ PLAN = make_plan(n_records=40)  # four shards of one size
 
 @pytest.fixture(params=[True, False], ids=["labelled", "older"])
 def labelled(request):
-    """Whether shards name their data set and number; those of older versions do not."""
+    """True where shards name their data set and number; those of older versions do not."""
     return request.param
 
 
@@ -202,7 +202,7 @@ def test_the_full_check_of_an_interrupted_set_looks_at_what_is_made(tmp_path):
 
 
 def test_root_attributes_are_the_same_in_all_shards_and_the_index(new_folder):
-    """What older versions of gensig verify; the number of a shard is elsewhere."""
+    """The checks that older versions of gensig make; the number of a shard is elsewhere."""
     paths = [shard_path(new_folder, index) for index in range(4)]
     with open_dataset(new_folder) as data:
         attributes, identity = data.attributes, data.manifest.identity

@@ -177,7 +177,7 @@ def test_a_changed_matlab_file_gives_values_or_one_line(seed, is_compressed, tmp
 
 
 def check_values_or_one_line(file):
-    """What is read has values; what is not is refused in one printable line."""
+    """A changed file has values or is refused in one printable line."""
     text, n_axes = str(file), 2
     try:
         n_axes = read_file(str(file), rate=float(RATE)).values.ndim

@@ -240,7 +240,7 @@ def test_card_states_sizes_and_warns_of_the_leak(hub):
 
 
 def test_a_protocol_of_a_later_version_is_exported_by_its_name_only(tmp_path):
-    """Which units it keeps apart is not known here, and the card says so."""
+    """A protocol of unknown units is exported only by its name, and the card says so."""
     folder = build(tmp_path / "set", every_protocol_plan(), references=True)
     text = (folder / "splits" / "by_unit.csv").read_text()
     (folder / "splits" / "by_moon.csv").write_text(text)
