@@ -67,7 +67,7 @@ def test_every_method_that_trains_on_test_records_is_noticed(study):
 
 @pytest.mark.parametrize("study", STUDIES)
 def test_validation_records_scale_and_fit_nothing(study, without_choice):
-    """Validation records, where there is nothing to choose, decide thresholds and calibration alone."""
+    """Validation records decide thresholds and calibration alone if nothing is chosen."""
     assert noticed(beside_calibration(study)) == set()
 
 
