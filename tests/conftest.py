@@ -1,18 +1,23 @@
 """Shared fixtures: the paper's rig as a configuration and as a machine."""
 
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+import gensig.compilation
 from gensig.dynamics.pair import PairDynamics
 from gensig.geometry.gear import Gear
 from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
+
+# A cold cache of kernels adds no line to what a command prints; test_progress has a process for it.
+gensig.compilation.on_compilation = lambda tell: nullcontext()
 
 # The first file compiles the integrator, which takes a minute; those of the networks, which
 # another process begins with, need none of it and find everything compiled afterwards. Then
