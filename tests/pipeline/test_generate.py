@@ -120,7 +120,9 @@ def test_python_reuses_and_finishes_the_same_data_set_only(
 
 
 def test_python_warns_of_a_plan_without_sense(tmp_path):
-    with pytest.warns(UserWarning, match="root of the teeth has"):
+    """The warning names the line that called for the data set."""
+    with pytest.warns(UserWarning, match="root of the teeth has") as warned:
         gensig.generate(
             *SMALL, "operating.torque_nm=400", out=tmp_path / "data", progress=False
         )
+    assert {warning.filename for warning in warned} == {__file__}

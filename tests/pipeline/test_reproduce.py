@@ -14,6 +14,8 @@ from small_sets import TINY, make
 from gensig.cli import main
 from gensig.dataset.storage.atomic import sha256_file
 from gensig.dynamics.backends.registry import UNNAMED_BACKEND
+from gensig.production import reproduction
+from gensig.production.reproduction import ACCEPTED
 
 SET = (
     "dataset.records_per_shard=4",
@@ -103,6 +105,21 @@ def test_a_difference_is_accepted_only_elsewhere_and_up_to_1e_6(
     assert "5 of 6 records have the same bits" in said
     assert f"largest difference {part:.2g} of the record's RMS, in r000005" in said
     assert ("made with cpu_model Another CPU" in said) == bool(environment)
+
+
+@pytest.mark.parametrize(
+    ("difference", "n_refused"),
+    [(ACCEPTED + 1e-5, 0), (np.nextafter(ACCEPTED + 1e-5, 1.0), 2)],
+)
+def test_the_limit_itself_is_accepted(
+    reference, tmp_path, monkeypatch, difference, n_refused
+):
+    """One count of stored counts is added to it."""
+    folder = shutil.copytree(reference, tmp_path / "data")
+    edit_manifest(folder, lambda content: content["environment"].update(ELSEWHERE))
+    found = difference, 1e-5
+    monkeypatch.setattr(reproduction, "_difference", lambda *_: found)
+    assert reproduction.reproduce(folder, 2).n_refused == n_refused
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from refusals import refused
 
 from gensig.operation.courses import (
     EARLIEST,
+    MOST_POINTS,
     WALK_LIMIT,
     Ramp,
     RandomWalk,
@@ -92,6 +93,14 @@ class TestRandomWalk:
     def test_too_short_a_correlation_time(self):
         with refused("= 0.01 must lie in 0.02..1e+06"):
             replace(WALK, correlation_time=0.01)
+
+    def test_as_many_points_as_a_profile_takes(self):
+        """One every millisecond."""
+        quick = replace(WALK, correlation_time=0.02)
+        duration = EARLIEST + 1e-3 * (MOST_POINTS - 2.5)
+        assert len(walk(0, quick, duration).times) == MOST_POINTS
+        with refused(f"needs {MOST_POINTS + 1} points"):
+            walk(0, quick, duration + 1e-3)
 
     def test_too_many_points(self):
         quick = replace(WALK, correlation_time=0.02)

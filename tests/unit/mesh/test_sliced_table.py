@@ -11,11 +11,13 @@ from closeness import assert_close
 
 from gensig.errors import FaultError
 from gensig.faults.registry import read_faults
+from gensig.mesh import pair_table
 from gensig.mesh.load_distribution import (
     loaded_pair_table,
     pair_states,
     static_mesh,
 )
+from gensig.mesh.sliced import sliced_table
 from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
 from gensig.mesh.sliced.sliced_table import DEEPEST, N_CHORDS
 from gensig.mesh.sliced.slices import (
@@ -242,6 +244,29 @@ def test_slopes_are_those_of_the_values():
         step = 0.5 * distance * (slopes[..., 1:] + slopes[..., :-1])
         atol = 1e-9 * np.abs(values).max()
         assert_close(np.diff(values, axis=3), step, atol=atol)
+
+
+def test_steps_are_smoothed_without_ringing(monkeypatch):
+    """A node is the mean with its neighbours, but for a quarter of the clipped correction."""
+    system, table, _ = table_of()
+    monkeypatch.setattr(
+        sliced_table, "smooth", lambda values, *_: (values, np.zeros_like(values))
+    )
+    plain = sliced_table.sliced_table(
+        system.pair,
+        system.material,
+        system.mesh,
+        system.slices,
+        force=system.mesh_force,
+        deviation=system.deviation(),
+    )
+    values = plain.compliance[0, 0]
+    mean = 0.25 * (values[:, 2:] + 2.0 * values[:, 1:-1] + values[:, :-2])
+    most = 0.25 * pair_table.SMOOTHED_SHARE * values.min(axis=1)
+    off = np.abs(table.compliance[0, 0, :, 1:-1] - mean).max(axis=1)
+
+    assert (off < (1.0 + 1e-6) * most).all()
+    assert (np.abs(np.diff(values, axis=1)).max(axis=1) > 10.0 * most).all()
 
 
 # the spur table's contact is a secant at the load of sound pairs

@@ -10,6 +10,7 @@ from gensig.errors import SimulationError
 from gensig.plan.make import varied_keys
 from gensig.plan.request import read_request
 from gensig.production.prediction import FailedRecordsWarning, predict
+from gensig.production.shard_writing import block_length
 from gensig.record import inputs as records
 
 CLASSES = "plan.classes=[healthy,crack,pitting,missing_tooth]"
@@ -91,6 +92,15 @@ def test_faults_of_lives_grow():
     grown = {name for name, text in varied.items() if text == "grows along each life"}
     assert grown == set(config["classes"])
     assert set(varied) - grown == set(config["plan"]["vary"])
+
+
+@pytest.mark.parametrize(
+    ("duration", "n_records"), [(1, 16), (8, 10), (9, 9), (1000, 8)]
+)
+def test_a_block_is_as_many_records_as_128_mebibytes_hold(duration, n_records):
+    """From 8, one for each lane, to 16; a second of four channels has 1.6 MB."""
+    words = [f"operating.duration_s={duration}"]
+    assert block_length(read_request(words).config) == n_records
 
 
 def test_records_that_fail_while_they_are_timed_are_told(monkeypatch):

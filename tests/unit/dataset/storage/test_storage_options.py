@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from dataset_samples import (
+    SIGNALS,
     build,
     forge,
     make_plan,
@@ -301,6 +302,18 @@ def test_blosc2_bombs_are_refused(tmp_path, plan, monkeypatch):
         open_shard(path)
     with pytest.raises(DatasetError, match="has 1600 bytes, blosc2 takes 1599"):
         write_shard(path, plan, compression="blosc2")
+
+
+def test_blosc2_takes_a_quarter_of_a_gibibyte(tmp_path):
+    n_samples = 2**28 // 4 // 2  # of two channels
+
+    def declare(n_samples):
+        signals = SIGNALS | {"acceleration": (2, n_samples)}
+        writer_of(tmp_path / "a.h5", compression="blosc2", signals=signals)
+
+    declare(n_samples)
+    with pytest.raises(DatasetError, match="has 268435464 bytes, blosc2 takes 2"):
+        declare(n_samples + 1)
 
 
 def test_generate_refuses_before_it_touches_anything(tmp_path, monkeypatch, capsys):
