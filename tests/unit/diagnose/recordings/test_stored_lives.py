@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from refusals import refused
 from runs import metrics_of, model_of, refuses, rows_of, says, serve
 
 from diagnose.scoring.life_scores import MEASURES
-from diagnose.training.life_store import load_life_model
+from diagnose.training.life_store import LifeFacts, load_life_model
 from diagnose.training.store import load_model
 from gensig.errors import DatasetError
 
@@ -252,6 +253,22 @@ def test_a_wrong_description_is_refused(change, models, tmp_path):
     (tmp_path / "model.json").write_text(json.dumps(content))
     with refused("does not describe a model of remaining lives", DatasetError):
         load_life_model(tmp_path)
+
+
+def test_intervals_are_from_no_width_to_the_early_life():
+    facts = LifeFacts(
+        method="cnn",
+        early_life_h=3.0,
+        half_width_h=0.0,
+        coverage=0.9,
+        n_calibration_lives=9,
+        told=(),
+        told_range={},
+    )
+    assert replace(facts, half_width_h=3.0).half_width_h == 3.0
+    for hours in (-0.01, 3.01):
+        with pytest.raises(ValueError, match="are no hours"):
+            replace(facts, half_width_h=hours)
 
 
 def test_weights_of_another_network_are_refused(life_study, tmp_path):

@@ -121,7 +121,7 @@ def test_groups_without_every_class_are_scored_by_the_share_right():
     assert [row["scores"]["cnn"]["mean"] for row in rows] == [1, 0, 0, 0]
 
 
-def test_fault_parameters_seeds_and_repetitions_are_no_conditions():
+def test_fault_parameters_seeds_repetitions_and_gaps_are_no_conditions():
     dataset = FakeDataset(n_units=4)
     speed, n = dataset.column("speed_rpm"), dataset.n_records
     dataset.columns |= {
@@ -130,6 +130,7 @@ def test_fault_parameters_seeds_and_repetitions_are_no_conditions():
         "params/operating.speed_rpm": 2 * speed,
         "params/lubricant.temperature_c": dataset.column("unit_gain"),
         "params/sensor.position_mm": np.ones((n, 2)),
+        "params/sensing.snr_db": np.where(np.arange(n) > 3, np.arange(n), np.nan),
         "torque_nm": np.full(n, 30.0),
         "gearbox_id": dataset.column("record_id"),  # more names than conditions
     }
