@@ -10,6 +10,7 @@ import gensig.errors
 from gensig.cli import main
 from gensig.dataset.folder.manifest import read_manifest
 from gensig.dataset.folder.verify import verify
+from gensig.production import making
 
 SMALL = (
     "plan.n_records=8",
@@ -120,9 +121,14 @@ def test_python_reuses_and_finishes_the_same_data_set_only(
 
 
 def test_python_warns_of_a_plan_without_sense(tmp_path):
-    """The warning names the line that called for the data set."""
-    with pytest.warns(UserWarning, match="root of the teeth has") as warned:
+    with pytest.warns(UserWarning, match="root of the teeth has"):
         gensig.generate(
             *SMALL, "operating.torque_nm=400", out=tmp_path / "data", progress=False
         )
-    assert {warning.filename for warning in warned} == {__file__}
+
+
+def test_a_warning_names_the_line_that_called(tmp_path, monkeypatch):
+    monkeypatch.setattr(making, "plan_doubts", lambda *_: ["a doubt"])
+    with pytest.warns(UserWarning, match="^a doubt$") as warned:
+        gensig.generate(*SMALL, out=tmp_path / "data", progress=False).close()
+    assert [warning.filename for warning in warned] == [__file__]
