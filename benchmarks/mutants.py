@@ -320,15 +320,18 @@ def campaign(
     """Results of the mutants that have none yet, or are to be judged again."""
     reasons = read_reasons(REASONS)
     done = {result.mutant.key for result in earlier}
-    if arguments.again:
-        settled = (KILLED, EQUIVALENT)
-        done = {result.mutant.key for result in earlier if result.verdict in settled}
     commit = _commit(copy.root)
     drawn = drawn_mutants(copy.tree, arguments.seed)
     chosen = [next(drawn) for _ in range(arguments.count)]
     chosen += fixed_mutants(copy.tree)
+    if arguments.again:  # those too that changed modules draw no longer
+        settled = (KILLED, EQUIVALENT)
+        left = [result.mutant for result in earlier if result.verdict not in settled]
+        done -= {mutant.key for mutant in left}
+        known = {mutant.key for mutant in chosen}
+        chosen += [mutant for mutant in left if mutant.key not in known]
     for mutant in chosen:
-        if mutant.key in done:
+        if mutant.key in done or not mutant.fits(copy.tree):
             continue
         if reasons.get(mutant.key, ("", ""))[0] == EQUIVALENT:
             yield Result(

@@ -1,10 +1,12 @@
 """``python -m benchmarks.mutants``: what is changed, who judges it, and a sample of verdicts."""
 
+import argparse
 import ast
 import itertools
 import os
 import subprocess
 import textwrap
+from dataclasses import replace
 
 import pytest
 
@@ -202,6 +204,22 @@ class TestVerdicts:
         monkeypatch.setattr(_mutant_tests, "SECONDS_A_MUTANT", 2)
         result = mutants.judge(copy, mutant_of("n += 1", "n -= 1"), "")
         assert result.verdict == "unfinished"
+
+    def test_a_stored_survivor_is_judged_again_though_no_longer_drawn(
+        self, copy, mutant_of, monkeypatch
+    ):
+        monkeypatch.setattr(mutants, "drawn_mutants", lambda *_: iter(()))
+        monkeypatch.setattr(mutants, "fixed_mutants", lambda _: [])
+        monkeypatch.setattr(mutants, "_commit", lambda _: "")
+        stored = [
+            replace(result_with("survived"), mutant=mutant_of("a < b", "a >= b")),
+            replace(result_with("survived"), mutant=mutant_of("a line that went", "")),
+            replace(result_with(KILLED), mutant=mutant_of("n += 1", "n -= 1")),
+        ]
+        for again, verdicts in ((True, [KILLED]), (False, [])):
+            arguments = argparse.Namespace(again=again, count=0, seed=0)
+            results = mutants.campaign(copy, arguments, stored)
+            assert [result.verdict for result in results] == verdicts
 
     def test_a_test_that_fails_anyway_is_found_out(self, copy, mutant_of):
         result = mutants.judge(copy, mutant_of("a < b", "a >= b"), "")
