@@ -200,11 +200,12 @@ def nearest_tests(root: Path, name: str, function: str = "") -> list[str]:
     name : path of the module, relative to it
     function : qualified name of what changes in it
 
-    A file ranks by the imports between it and the module, by their names and folders, and by its
-    mention of the function or its class. Tests of whole commands come last, unless they import
-    the module themselves.
+    A file ranks by the imports between it and the module, by their names and folders, by its
+    mention of the function or its class, and higher among the tests of the module's package.
+    Tests of whole commands come last, unless they import the module themselves.
     """
     module, folder = _dotted(name), _folder_of_tests(name)
+    package = "/".join(folder.split("/")[:3])  # such as tests/unit/dataset
     ranks = {}
     for test, imported in _imports_of_tests(root).items():
         distance, likeness = _distance(root, imported, module), _likeness(test, name)
@@ -214,6 +215,7 @@ def nearest_tests(root: Path, name: str, function: str = "") -> list[str]:
         is_late = test.startswith(COMMANDS) and folder != COMMANDS and distance > 1
         nearness = likeness + 1.0 / distance
         nearness += 1.0 * _mentions(root / test, function)
+        nearness += 0.5 * Path(test).is_relative_to(package)
         ranks[test] = is_late, -nearness, test
     return sorted(ranks, key=lambda test: ranks[test])[:MOST_FILES]
 

@@ -322,8 +322,8 @@ def campaign(
     done = {result.mutant.key for result in earlier}
     commit = _commit(copy.root)
     drawn = drawn_mutants(copy.tree, arguments.seed)
-    chosen = [next(drawn) for _ in range(arguments.count)]
-    chosen += fixed_mutants(copy.tree)
+    chosen = fixed_mutants(copy.tree)
+    chosen += [next(drawn) for _ in range(arguments.count)]
     if arguments.again:  # those too that changed modules draw no longer
         settled = (KILLED, EQUIVALENT)
         left = [result.mutant for result in earlier if result.verdict not in settled]
