@@ -21,6 +21,7 @@ from gensig.execution.array import ArrayExecutor
 from gensig.execution.local import LocalExecutor
 from gensig.plan.request import read_request
 from gensig.production.folder import begin_folder, run_folder
+from gensig.production.shard_writing import write_shard
 
 N_SHARDS = 6
 SPLIT = "splits/random_window_leaky.csv"
@@ -266,3 +267,16 @@ def test_a_lost_shard_with_other_bits_is_not_put_in_its_place(data, capsys):
     assert resume(data) == 1
     assert "shard-00002.h5 was lost and has other bits" in capsys.readouterr().err
     assert everything(data) == before
+
+
+def test_a_shard_with_one_row_of_another_is_not_made(tmp_path):
+    """Rows of the manifest that were moved from the second shard to the first."""
+    out, words = tmp_path / "data", [*TINY, "dataset.records_per_shard=3"]
+    begin_folder(read_request(words).config, words, out)
+    content = json.loads((out / "manifest.json").read_text())
+    for shard, n_rows in zip(content["shards"], (4, 2), strict=True):
+        shard["rows"] = n_rows
+    (out / "manifest.json").write_text(json.dumps(content))
+    with pytest.raises(DatasetError, match="the manifest disagree on shard 0"):
+        write_shard(out, 0)
+    assert not shard_path(out, 0).exists()
