@@ -165,6 +165,7 @@ REFUSED = [
     ("--array is for .npz", "r.wav", {"array": "x"}),
     ("--array is for .npz", "back.csv", {"array": "x"}),
     ("time_s must rise in even steps", "back.csv", {}),
+    ("time_s must rise in even steps", "round.csv", {}),
     ("there is no column beside time_s", "times.csv", {}),
     ("it is no plain array", "archive.npy", RATED),
     ("it is no plain array", "array.npz", RATED),
@@ -200,7 +201,8 @@ def broken_files(tmp_path_factory):
     for name, arrays in matlab.items():
         io.savemat(folder / f"{name}.mat", arrays)
     time = np.arange(300) / RATE
-    tables = {"back": (-time, time), "times": (time,)}
+    around = np.append(time[:-1], time[0])  # begins anew at its end
+    tables = {"back": (-time, time), "round": (around, time), "times": (time,)}
     for name, columns in tables.items():
         header = ",".join(["time_s", "a"][: len(columns)])
         path = folder / f"{name}.csv"
