@@ -1,6 +1,7 @@
 """Remaining lives: scores against values by hand, intervals, splits of lives, what is learnt."""
 
 import pickle
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,6 +29,7 @@ from diagnose.scoring.life_scores import (
     prognostic_horizon,
 )
 from diagnose.scoring.machines import Machines
+from diagnose.studies import life_jobs
 from diagnose.studies.life_jobs import run_life_job
 from diagnose.studies.life_study import plan_life_study
 from diagnose.studies.study import task_from
@@ -336,6 +338,25 @@ def test_a_job_that_is_sent_to_another_process_gives_the_same_bits(life_study, l
     for run in run_life_job(task, settings, job):
         expected = [row["predicted_h"] for row in rows if row["method"] == run.method]
         assert [f"{hours:.6g}" for hours in run.predicted] == expected
+
+
+def test_only_the_training_part_has_what_a_training_profits_from(monkeypatch):
+    dataset = FakeLives(n_lives=8)
+    task, settings = settled(dataset, "epochs=1", "remaining_life.with_age=false")
+    job = plan_life_study(task, settings).jobs[-1]
+    load, asked = life_jobs.input_of(settings.model).load, {}
+
+    def watched(task, part, *, training):
+        asked[tuple(np.unique(part.record))] = training
+        return load(task, part, training=training)
+
+    monkeypatch.setattr(life_jobs, "input_of", lambda _: SimpleNamespace(load=watched))
+    run_life_job(task, settings, job)
+    parts = life_jobs.life_sets(task, settings, job.protocols[0]).parts
+    wanted = {
+        tuple(np.unique(part.record)): name == "train" for name, part in parts.items()
+    }
+    assert asked == wanted
 
 
 def test_too_few_validation_lives_give_intervals_that_say_nothing(tmp_path):
