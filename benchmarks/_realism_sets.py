@@ -81,7 +81,7 @@ class Size:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """One data set of the yardstick: classes, further overrides, and a suffix of its faults' ids."""
+    """One data set of the yardstick: classes, further overrides, suffix of its faults' ids."""
 
     name: str
     classes: tuple[str, ...]
