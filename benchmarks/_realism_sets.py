@@ -102,6 +102,7 @@ GRIDS = (
 )
 
 
+ADDED = Size(n_units=16, n_gearboxes=4)  # of the grids after the first, when made alone
 QUICK = Size(n_units=8, n_gearboxes=2, n_turns=10.5, recording_duration=1.28)
 
 

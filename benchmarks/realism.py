@@ -35,6 +35,7 @@ from benchmarks._realism_recording import (
 )
 from benchmarks._realism_sets import (
     CONTROLS,
+    ADDED,
     GRIDS,
     QUICK,
     Grid,
@@ -61,9 +62,8 @@ ROOT = Path(__file__).resolve().parent.parent
 FIGURES = ROOT / "docs" / "figures"
 BASE = "experiment=realistic"
 HEALTHY = "healthy"
-ADDED = (
-    "; surface_damage and missing_tooth_run_in: "  # in the heading of stored results
-)
+# in the heading of stored results, before that of rows made alone
+ADDED_HEADING = "; surface_damage and missing_tooth_run_in: "
 PAGE = "gensig validate --markdown docs/validation.md"
 
 
@@ -88,11 +88,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
         return 2
-    size, base, begun = (
-        QUICK if options.quick else Size(),
-        shlex.split(options.base),
-        time.perf_counter(),
-    )
+    size, base, begun = Size(), shlex.split(options.base), time.perf_counter()
+    if options.quick:
+        size = QUICK
+    if options.added:
+        size = ADDED
     named = machine()
     print_machine(named)
     pictures = FIGURES if options.stored else options.figures
@@ -216,8 +216,8 @@ def add_to_stored(
     rows = {row.key: row for row in stored} | made
     yardstick = [rows.pop(place) for place in read_ranges() if place in rows]
     figures.plot_yardstick(yardstick, pictures / "realism_yardstick.png")
-    first = stored_heading.partition(ADDED)[0]
-    return f"{first}{ADDED}{heading}", [*yardstick, *rows.values()]
+    first = stored_heading.partition(ADDED_HEADING)[0]
+    return f"{first}{ADDED_HEADING}{heading}", [*yardstick, *rows.values()]
 
 
 def _plain(value: Any) -> Any:
