@@ -34,8 +34,8 @@ from benchmarks._realism_recording import (
     simulated_indicators,
 )
 from benchmarks._realism_sets import (
-    CONTROLS,
     ADDED,
+    CONTROLS,
     GRIDS,
     QUICK,
     Grid,
