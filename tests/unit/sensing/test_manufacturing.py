@@ -437,7 +437,7 @@ def test_gearbox_factors_scatter_as_the_quality_says(quality):
     ("key", "value", "text"),
     [
         ("iso1328_grade", 12, " = 12 must lie in 1..11, or be null"),
-        ("run_in_share", 1.5, "run_in_share = 1.5 must"),
+        ("run_in_share", 1.5, " = 1.5 must lie in 0..1"),
         ("used_share_low", 0.95, " and used_share_high must be ordered"),
         ("support_damping_scatter", -0.1, " = -0.1 must lie in 0..1"),
         ("tooth_share", 1.1, " = 1.1 must lie in 0..1"),
