@@ -33,6 +33,7 @@ SPEED, TORQUE, GRADE = (
 )
 CLASSES = ("healthy", "crack", "missing_tooth", "distributed_pitting")
 CRACK_SHARES = (0.25, 0.5)  # of the root chord, as asked
+RUN_IN_SHARE = 0.5  # assumed, before any record was made with it
 
 # The recording: teeth and speed from its description; sampling rate and length as recorded.
 RECORDING_TEETH, RECORDING_SPEED, RECORDING_RATE, RECORDING_DURATION = (
@@ -78,11 +79,37 @@ class Size:
             )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grid:
+    """One data set of the yardstick: classes, further overrides, suffix of its faults' ids."""
+
+    name: str
+    classes: tuple[str, ...]
+    words: tuple[str, ...] = ()
+    suffix: str = ""
+
+
+# those after the first stand beside it and leave its records alone
+GRIDS = (
+    Grid(name="yardstick", classes=CLASSES),
+    Grid(name="surface", classes=("healthy", "surface_damage")),
+    Grid(
+        name="run_in",
+        classes=("healthy", "missing_tooth"),
+        words=(f"quality.run_in_share={RUN_IN_SHARE}",),
+        suffix="_run_in",
+    ),
+)
+
+
+ADDED = Size(n_units=16, n_gearboxes=4)  # of the grids after the first, when made alone
 QUICK = Size(n_units=8, n_gearboxes=2, n_turns=10.5, recording_duration=1.28)
 
 
-def yardstick_words(base: Sequence[str], size: Size) -> list[str]:
-    """Overrides of the grid.
+def yardstick_words(
+    base: Sequence[str], size: Size, grid: Grid = GRIDS[0]
+) -> list[str]:
+    """Overrides of a grid.
 
     Every unit runs every speed and torque, healthy and with each fault.
     """
@@ -95,20 +122,24 @@ def yardstick_words(base: Sequence[str], size: Size) -> list[str]:
         key: {"distribution": "choice", "values": levels}
         for key, levels in ((SPEED, speeds), (TORQUE, torques))
     }
-    chord = root_chord(base)
-    low, high = (round(share * chord * 1e3, 4) for share in CRACK_SHARES)
-    cracks = {"crack_depth_mm": {"distribution": "uniform", "low": low, "high": high}}
+    cracks = []
+    if "crack" in grid.classes:
+        chord = root_chord(base)
+        low, high = (round(share * chord * 1e3, 4) for share in CRACK_SHARES)
+        depths = {"distribution": "uniform", "low": low, "high": high}
+        cracks = [f"fault.vary={_flow({'crack_depth_mm': depths})}"]
     return [
         *base,
+        *grid.words,
         *_steady_length(config, size.n_turns * 60.0 / min(speeds)),
         "plan.design=grid",
         "plan.n_records=null",
-        f"plan.classes=[{','.join(CLASSES)}]",
+        f"plan.classes=[{','.join(grid.classes)}]",
         f"plan.n_units={size.n_units}",
         f"plan.n_gearboxes={size.n_gearboxes}",
         *CROSSED,
         f"plan.vary={_flow(vary)}",
-        f"fault.vary={_flow(cracks)}",
+        *cracks,
         "dataset.store_shaft_angle=true",
     ]
 

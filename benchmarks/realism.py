@@ -34,8 +34,11 @@ from benchmarks._realism_recording import (
     simulated_indicators,
 )
 from benchmarks._realism_sets import (
+    ADDED,
     CONTROLS,
+    GRIDS,
     QUICK,
+    Grid,
     Size,
     kept,
     recording_words,
@@ -46,8 +49,10 @@ from gensig.errors import GensigError
 from gensig.report.realism import (
     RESULTS,
     Comparison,
+    RangeKey,
     compare,
     read_ranges,
+    read_results,
     table,
     write_results,
 )
@@ -56,6 +61,9 @@ from gensig.version import __version__
 ROOT = Path(__file__).resolve().parent.parent
 FIGURES = ROOT / "docs" / "figures"
 BASE = "experiment=realistic"
+HEALTHY = "healthy"
+# in the heading of stored results, before that of rows made alone
+ADDED_HEADING = "; surface_damage and missing_tooth_run_in: "
 PAGE = "gensig validate --markdown docs/validation.md"
 
 
@@ -68,32 +76,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
         return 2
+    if options.added and not options.stored:
+        print(
+            "benchmarks.realism: --added puts rows into the stored results; it needs --stored",
+            file=sys.stderr,
+        )
+        return 2
     if options.stored and options.quick:
         print(
             "benchmarks.realism: --quick simulates too few units to store; leave it out",
             file=sys.stderr,
         )
         return 2
-    size, base, begun = (
-        QUICK if options.quick else Size(),
-        shlex.split(options.base),
-        time.perf_counter(),
-    )
+    size, base, begun = Size(), shlex.split(options.base), time.perf_counter()
+    if options.quick:
+        size = QUICK
+    if options.added:
+        size = ADDED
     named = machine()
     print_machine(named)
     pictures = FIGURES if options.stored else options.figures
-    place = nullcontext(options.data) if options.data else tempfile.TemporaryDirectory()
-    try:
-        with place as folder:
-            result = compare_all(base, size, Path(folder), pictures)
-    except (GensigError, OSError) as error:
-        print(f"benchmarks.realism: {error}", file=sys.stderr)
-        return 1
     heading = (
         f"{' '.join(base)}, gensig {__version__}, {size.n_units} units in "
         f"{size.n_gearboxes} gearboxes; "
         f"ranges frozen in commit {options.frozen or '(none named)'}"
     )
+    place = nullcontext(options.data) if options.data else tempfile.TemporaryDirectory()
+    try:
+        with place as folder:
+            if options.added:
+                heading, result = add_to_stored(
+                    base, size, Path(folder), heading, FIGURES
+                )
+            else:
+                result = compare_all(base, size, Path(folder), pictures)
+    except (GensigError, OSError) as error:
+        print(f"benchmarks.realism: {error}", file=sys.stderr)
+        return 1
     print(
         "\n".join(
             [
@@ -158,22 +177,47 @@ def compare_all(
 
 
 def yardstick_comparisons(
-    base: Sequence[str], size: Size, folder: Path
+    base: Sequence[str], size: Size, folder: Path, grids: Sequence[Grid] = GRIDS
 ) -> list[Comparison]:
-    """Rows of the first table."""
-    with kept(folder / "yardstick", yardstick_words(base, size)) as data:
-        result = read_table(data)
-    least = result.indicators["n_turns"].min()
-    told = (
-        f"{data.n_records} records, {result.n_failed} failed, at least {least:.0f} turns of "
-        "the faulted shaft"
-    )
-    print(f"yardstick: {told}", flush=True)
-    values = quantities(result)
-    return [
-        compare(measured, values.get(place, math.nan))
-        for place, measured in read_ranges().items()
-    ]
+    """Rows of the first table; without the first grid only those of the others."""
+    values: dict[RangeKey, Any] = {}
+    for grid in grids:
+        with kept(folder / grid.name, yardstick_words(base, size, grid)) as data:
+            result = read_table(data)
+        least = result.indicators["n_turns"].min()
+        told = (
+            f"{data.n_records} records, {result.n_failed} failed, at least {least:.0f} turns of "
+            "the faulted shaft"
+        )
+        print(f"{grid.name}: {told}", flush=True)
+        for (name, at), found in quantities(result).items():
+            fault, dot, indicator = name.partition(".")
+            if fault != HEALTHY:
+                values[f"{fault}{grid.suffix}{dot}{indicator}", at] = found
+            elif grid is GRIDS[0]:
+                values[name, at] = found
+    ranges = read_ranges()
+    if GRIDS[0] not in grids:
+        ranges = {place: one for place, one in ranges.items() if place in values}
+    return [compare(one, values.get(place, math.nan)) for place, one in ranges.items()]
+
+
+def add_to_stored(
+    base: Sequence[str], size: Size, folder: Path, heading: str, pictures: Path
+) -> tuple[str, list[Comparison]]:
+    """Heading and rows of the stored results with the rows of the added grids made now.
+
+    All other rows stay as they are stored.
+    """
+    stored_heading, stored = read_results(RESULTS)
+    made = {
+        row.key: row for row in yardstick_comparisons(base, size, folder, GRIDS[1:])
+    }
+    rows = {row.key: row for row in stored} | made
+    yardstick = [rows.pop(place) for place in read_ranges() if place in rows]
+    figures.plot_yardstick(yardstick, pictures / "realism_yardstick.png")
+    first = stored_heading.partition(ADDED_HEADING)[0]
+    return f"{first}{ADDED_HEADING}{heading}", [*yardstick, *rows.values()]
 
 
 def _plain(value: Any) -> Any:
@@ -203,6 +247,11 @@ def _parser() -> argparse.ArgumentParser:
         "--stored",
         action="store_true",
         help="store the results and figures for docs/howto/realism.md",
+    )
+    parser.add_argument(
+        "--added",
+        action="store_true",
+        help="with --stored: make surface damage and run-in alone, other stored rows stay",
     )
     parser.add_argument(
         "--frozen",

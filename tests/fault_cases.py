@@ -91,6 +91,8 @@ CASES = {
     "spall_width": case("spalling", "spall_width_mm", 1, 8, 16, FULL),
     "spall_length": case("spalling", "spall_length_mm", 0.3, 1.0, 2.0),
     "pitted_share": case("distributed_pitting", "pitted_share", 0.02, 0.1, 0.3),
+    # proud edges touch earlier
+    "damage": case("surface_damage", "damage", 0.2, 0.5, 1.0, grows=False),
     # the contact of a broken tooth moves down to its corner, where the tooth is stiffer: first
     # order in the load,
     # while the corner's gap is second order in the distance

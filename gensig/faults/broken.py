@@ -10,7 +10,11 @@ from numpy.typing import NDArray
 
 from gensig.errors import FaultError
 from gensig.faults.base import Fault, Growth, require_choice, require_not_negative
-from gensig.faults.flank_loss import root_chord_abscissa
+from gensig.faults.flank_loss import (
+    edge_height,
+    require_edge,
+    root_chord_abscissa,
+)
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth
 from gensig.units import unit
@@ -45,16 +49,20 @@ class MissingTooth(Fault):
 class BrokenTooth(Fault):
     """A tooth broken off ``broken_height`` below its tip, over the whole face.
 
-    At full height it is missing.
+    At full height it is missing. Below the break the flanks stand ``broken_edge_height`` proud, a
+    burr that falls to nothing ``broken_edge_width`` below it.
     """
 
     kind: ClassVar[str] = "broken"
     growth: ClassVar[Growth] = Growth.NONE
     broken_height: float = unit("mm")
+    broken_edge_height: float = unit("um", default=0.0)
+    broken_edge_width: float = unit("mm", default=0.0)
 
     def __post_init__(self) -> None:
         Fault.__post_init__(self)
-        require_not_negative(self, "broken_height_mm")
+        keys = "broken_height_mm", "broken_edge_height_um", "broken_edge_width_mm"
+        require_not_negative(self, *keys)
 
     def severity(self, gear: Gear) -> float:
         """Broken share of the tooth's height above the root chord."""
@@ -67,7 +75,8 @@ class BrokenTooth(Fault):
     def apply(self, tooth: Tooth, number: int) -> Tooth:
         """The tooth without its tip; not present if no involute is left."""
         _require_height(self, "broken_height", self.broken_height, tooth.gear)
-        return _without_tip(tooth, np.array([self.broken_height]))
+        burr = self.broken_edge_height, self.broken_edge_width
+        return _without_tip(tooth, np.array([self.broken_height]), burr, "broken")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,7 +84,8 @@ class ChippedTooth(Fault):
     """A chip off the tip: ``chip_height`` below it, over ``chip_width`` from one end of the face.
 
     ``chip_shape`` is ``"triangular"`` (the whole height at the end, none at ``chip_width``) or
-    ``"rectangular"``.
+    ``"rectangular"``. Its burr, of ``chip_edge_height`` and ``chip_edge_width``, is like that of a
+    broken tooth.
     """
 
     kind: ClassVar[str] = "chipped"
@@ -83,10 +93,13 @@ class ChippedTooth(Fault):
     chip_height: float = unit("mm")
     chip_width: float = unit("mm")
     chip_shape: str = "triangular"
+    chip_edge_height: float = unit("um", default=0.0)
+    chip_edge_width: float = unit("mm", default=0.0)
 
     def __post_init__(self) -> None:
         Fault.__post_init__(self)
         require_not_negative(self, "chip_height_mm", "chip_width_mm")
+        require_not_negative(self, "chip_edge_height_um", "chip_edge_width_mm")
         require_choice(self, "chip_shape", CHIP_SHAPES)
 
     def severity(self, gear: Gear) -> float:
@@ -109,13 +122,15 @@ class ChippedTooth(Fault):
                 f"chip_width {self.chip_width * 1e3:.4g} mm is above the face width "
                 f"{gear.face_width * 1e3:.4g} mm of the {self.gear}; reduce fault.chip_width_mm"
             )
+        burr = self.chip_edge_height, self.chip_edge_width
         if self.chip_shape == "rectangular":
             sliced = tooth.split(np.array([self.chip_width]))
             is_chipped = sliced.slice_middle < self.chip_width
-            return _without_tip(sliced, np.where(is_chipped, self.chip_height, 0.0))
+            height = np.where(is_chipped, self.chip_height, 0.0)
+            return _without_tip(sliced, height, burr, "chip")
         sliced = tooth.split(np.linspace(0.0, self.chip_width, N_STRIPS + 1))
         height = self.chip_height * (1.0 - sliced.slice_middle / self.chip_width)
-        return _without_tip(sliced, np.maximum(height, 0.0))
+        return _without_tip(sliced, np.maximum(height, 0.0), burr, "chip")
 
 
 def tooth_height(gear: Gear) -> float:
@@ -133,10 +148,20 @@ def _require_height(fault: Fault, key: str, height: float, gear: Gear) -> None:
         )
 
 
-def _without_tip(tooth: Tooth, height: Array) -> Tooth:
-    """The tooth less ``height`` (slice,) m from its tip, measured on the centreline."""
-    gone = tooth.profile.flank_abscissa > tooth.gear.tip_radius - height[:, None]
-    broken = tooth.with_loss(np.where(gone, np.inf, 0.0))
-    if np.isfinite(broken.material_loss).any():
+def _without_tip(
+    tooth: Tooth, height: Array, burr: tuple[float, float], name: str
+) -> Tooth:
+    """The tooth less ``height`` (slice,) m from its tip, measured on the centreline.
+
+    ``burr`` is height and width of the raised edge below the break, in m; ``name`` is the prefix
+    of its keys.
+    """
+    below = tooth.gear.tip_radius - height[:, None] - tooth.profile.flank_abscissa
+    broken = tooth.with_loss(np.where(below < 0.0, np.inf, 0.0))
+    if not np.isfinite(broken.material_loss).any():
+        return replace(broken, present=False)
+    if burr[0] == 0.0:
         return broken
-    return replace(broken, present=False)
+    require_edge(tooth, burr[1], f"{name}_")
+    is_edge = (below >= 0.0) & (height[:, None] > 0.0)
+    return broken.with_deviation(-np.where(is_edge, edge_height(below, *burr), 0.0))

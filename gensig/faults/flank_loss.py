@@ -1,4 +1,4 @@
-"""Patches of material lost from a flank: the common part of pits and spalls."""
+"""Patches of material lost from a flank, and their raised edges, for pits, spalls and dents."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 SHAPES = {"rectangular": 1.0, "elliptic": 0.25 * math.pi}  # share of length x width
 N_STRIPS = 24  # across an ellipse
+EDGE_CELLS = 2  # of the outline, that a raised edge is wide at least
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,6 +26,8 @@ class Patch:
 
     ``length`` is along the tooth height, ``width`` along the face, ``depth`` inward. The middle
     lies at ``abscissa`` on the tooth centreline and ``face_position`` from one end of the face.
+    Around the hole the flank stands ``edge_height`` proud; that falls to nothing ``edge_width``
+    away.
     """
 
     shape: str
@@ -33,6 +36,8 @@ class Patch:
     depth: float
     abscissa: float
     face_position: float
+    edge_height: float = 0.0
+    edge_width: float = 0.0
 
     @property
     def area(self) -> float:
@@ -91,7 +96,14 @@ def remove_patch(tooth: Tooth, patch: Patch, name: str) -> Tooth:
     _require_on_flank(tooth, patch, name)
     n_strips = 1 if patch.shape == "rectangular" else N_STRIPS
     sliced = tooth.split(np.linspace(*patch.ends, n_strips + 1))
-    return sliced.with_loss(patch_loss(sliced, patch))
+    if patch.edge_height > 0.0:
+        require_edge(tooth, patch.edge_width, f"{name}_")
+        low, high = patch.ends
+        sliced = sliced.split(
+            np.array([low - patch.edge_width, high + patch.edge_width])
+        )
+    holed = sliced.with_loss(patch_loss(sliced, patch))
+    return holed.with_deviation(-patch_edge(sliced, patch))
 
 
 def patch_loss(tooth: Tooth, patch: Patch) -> Array:
@@ -99,6 +111,50 @@ def patch_loss(tooth: Tooth, patch: Patch) -> Array:
     reach = 0.5 * patch.height_at(tooth.slice_middle)[:, None]
     inside = np.abs(tooth.profile.flank_abscissa - patch.abscissa) <= reach
     return np.where(inside & (reach > 0.0), patch.depth, 0.0)
+
+
+def patch_edge(tooth: Tooth, patch: Patch) -> Array:
+    """Height of a patch's raised edge on the nodes of the flank, (slice, profile) m.
+
+    Nothing inside the hole. Distances from an ellipse are of first order.
+    """
+    along = np.abs(tooth.profile.flank_abscissa - patch.abscissa)
+    across = np.abs(tooth.slice_middle - patch.face_position)[:, None]
+    if patch.edge_height == 0.0:
+        return np.zeros(np.broadcast_shapes(along.shape, across.shape))
+    half_length, half_width = 0.5 * patch.length, 0.5 * patch.width
+    if patch.shape == "rectangular":
+        outside = (
+            np.maximum(along - half_length, 0.0),
+            np.maximum(across - half_width, 0.0),
+        )
+        distance = np.hypot(*outside)
+    else:
+        level = np.hypot(along / half_length, across / half_width)
+        slope = np.hypot(along / half_length**2, across / half_width**2)
+        steepness = np.maximum(slope / np.maximum(level, 1e-12), 1e-12)
+        distance = np.maximum(level - 1.0, 0.0) / steepness
+    height = edge_height(distance, patch.edge_height, patch.edge_width)
+    return np.where(patch_loss(tooth, patch) > 0.0, 0.0, height)
+
+
+def edge_height(distance: Array, height: float, width: float) -> Array:
+    """Height of a raised edge at distances from its rim, m: falls evenly to 0 at ``width``."""
+    return height * np.maximum(1.0 - distance / width, 0.0)
+
+
+def require_edge(tooth: Tooth, width: float, prefix: str) -> None:
+    """Raise a FaultError for a raised edge too narrow for the nodes of the outline.
+
+    ``prefix`` is that of the fault's keys of the edge.
+    """
+    least = EDGE_CELLS * float(np.diff(tooth.profile.flank_abscissa).max())
+    if width < least:
+        raise FaultError(
+            f"fault.{prefix}edge_width_mm = {width * 1e3:.4g} is too narrow for a raised edge: the "
+            f"{tooth.gear.name} tooth is drawn in steps, {EDGE_CELLS} of them are "
+            f"{least * 1e3:.3g} mm; increase it, or set fault.{prefix}edge_height_um=0"
+        )
 
 
 def _require_on_flank(tooth: Tooth, patch: Patch, name: str) -> None:
@@ -119,11 +175,20 @@ def _require_on_flank(tooth: Tooth, patch: Patch, name: str) -> None:
             f"{gear.name} tooth, which is {gear.face_width * 1e3:.4g} mm wide; change "
             f"fault.{name}_width_mm or fault.{name}_face_position_mm"
         )
+    require_depth(tooth, low, high, patch.depth, name)
+
+
+def require_depth(
+    tooth: Tooth, low: float, high: float, depth: float, name: str
+) -> None:
+    """Raise a FaultError for a hole between two abscissae that reaches the centreline."""
+    gear, profile = tooth.gear, tooth.profile
+    flank = profile.flank_abscissa
     inside = (flank >= low) & (flank <= high)
     half = profile.half_thickness[profile.n_root_cells :][inside]
-    if len(half) and patch.depth >= half.min():
+    if len(half) and depth >= half.min():
         raise FaultError(
-            f"{name}_depth {patch.depth * 1e3:.4g} mm reaches the centreline of the {gear.name} "
+            f"{name}_depth {depth * 1e3:.4g} mm reaches the centreline of the {gear.name} "
             f"tooth (half thickness {float(half.min()) * 1e3:.4g} mm there); reduce "
             f"fault.{name}_depth_mm"
         )

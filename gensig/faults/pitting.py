@@ -23,9 +23,11 @@ from gensig.faults.flank_loss import (
     Patch,
     flank_area,
     flank_ends,
+    patch_edge,
     patch_loss,
     pitch_abscissa,
     remove_patch,
+    require_edge,
     root_chord_abscissa,
 )
 from gensig.geometry.gear import Gear
@@ -68,7 +70,8 @@ class Pitting(Hole):
 
     ``pit_depth`` is inward. ``pit_position`` is the distance from the root chord to the middle of
     the pit on the tooth centreline; None puts it on the pitch circle, as in the paper.
-    ``pit_face_position`` is from one end of the face; None puts it in the middle.
+    ``pit_face_position`` is from one end of the face; None puts it in the middle. The flank
+    around the pit stands ``pit_edge_height`` proud, falling to nothing ``pit_edge_width`` away.
 
     Source: spur paper section 3.2, eqs. (13) to (18); h in (14) and (15) is the pit depth.
     """
@@ -81,22 +84,29 @@ class Pitting(Hole):
     pit_depth: float = unit("mm")
     pit_position: float | None = unit("mm", default=None)
     pit_face_position: float | None = unit("mm", default=None)
+    pit_edge_height: float = unit("um", default=0.0)
+    pit_edge_width: float = unit("mm", default=0.0)
 
     def __post_init__(self) -> None:
         # super() without arguments fails: slots make a new class
         Fault.__post_init__(self)
         require_not_negative(self, "pit_length_mm", "pit_width_mm", "pit_depth_mm")
+        require_not_negative(self, "pit_edge_height_um", "pit_edge_width_mm")
 
     def patch(self, gear: Gear) -> Patch:
         """The pit on a tooth of the gear."""
         size = self.pit_length, self.pit_width, self.pit_depth
         position = self.pit_position, self.pit_face_position
-        return _patch(gear, "rectangular", size, *position)
+        edge = self.pit_edge_height, self.pit_edge_width
+        return _patch(gear, "rectangular", size, *position, edge)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spalling(Hole):
-    """A larger hole, ``spall_shape`` rectangular or elliptic; positions as in ``Pitting``."""
+    """A larger hole, ``spall_shape`` rectangular or elliptic.
+
+    Positions and raised edge as in ``Pitting``.
+    """
 
     kind: ClassVar[str] = "spalling"
     growth: ClassVar[Growth] = Growth.NONE
@@ -107,18 +117,22 @@ class Spalling(Hole):
     spall_shape: str = "elliptic"
     spall_position: float | None = unit("mm", default=None)
     spall_face_position: float | None = unit("mm", default=None)
+    spall_edge_height: float = unit("um", default=0.0)
+    spall_edge_width: float = unit("mm", default=0.0)
 
     def __post_init__(self) -> None:
         Fault.__post_init__(self)
         lengths = "spall_length_mm", "spall_width_mm", "spall_depth_mm"
         require_not_negative(self, *lengths)
+        require_not_negative(self, "spall_edge_height_um", "spall_edge_width_mm")
         require_choice(self, "spall_shape", SHAPES)
 
     def patch(self, gear: Gear) -> Patch:
         """The spall on a tooth of the gear."""
         size = self.spall_length, self.spall_width, self.spall_depth
         position = self.spall_position, self.spall_face_position
-        return _patch(gear, self.spall_shape, size, *position)
+        edge = self.spall_edge_height, self.spall_edge_width
+        return _patch(gear, self.spall_shape, size, *position, edge)
 
 
 def _patch(
@@ -127,6 +141,7 @@ def _patch(
     size: tuple[float, float, float],
     position: float | None,
     face_position: float | None,
+    edge: tuple[float, float],
 ) -> Patch:
     abscissa = pitch_abscissa(gear)
     if position is not None:
@@ -140,6 +155,8 @@ def _patch(
         depth=size[2],
         abscissa=abscissa,
         face_position=face_position,
+        edge_height=edge[0],
+        edge_width=edge[1],
     )
 
 
@@ -151,7 +168,7 @@ class DistributedPitting(Fault):
     ``diameter_scatter`` of the logarithm. Depths are ``depth_ratio`` diameters. Positions are
     uniform over the face and over the flank's height from ``region_low`` to ``region_high`` (0 at
     the lower end of the involute, 1 at the tip). ``pit_seed`` and the tooth's number determine the
-    pits; a larger share includes all pits of a smaller one.
+    pits; a larger share includes all pits of a smaller one. Raised edges as in ``Pitting``.
     """
 
     kind: ClassVar[str] = "distributed_pitting"
@@ -164,6 +181,8 @@ class DistributedPitting(Fault):
     region_low: float
     region_high: float
     pit_seed: int
+    pit_edge_height: float = unit("um", default=0.0)
+    pit_edge_width: float = unit("mm", default=0.0)
 
     def __post_init__(self) -> None:
         Fault.__post_init__(self)
@@ -182,6 +201,7 @@ class DistributedPitting(Fault):
             ("pitted_share", 0.0 <= share <= most, share_rule),
         ):
             require(self, key, holds, rule)
+        require_not_negative(self, "pit_edge_height_um", "pit_edge_width_mm")
 
     def severity(self, gear: Gear) -> float:
         """Pitted share of the flank."""
@@ -201,13 +221,17 @@ class DistributedPitting(Fault):
         rng = np.random.Generator(np.random.Philox(seed))
         heights = np.gradient(sliced.profile.flank_abscissa)
         cell_area = np.outer(sliced.slice_width, heights) / flank_area(gear)
-        loss = np.zeros_like(cell_area)
+        loss, edge = np.zeros_like(cell_area), np.zeros_like(cell_area)
+        if self.pit_edge_height > 0.0:
+            require_edge(tooth, self.pit_edge_width, "pit_")
         ends = flank_ends(gear)
         for _ in range(MOST_PITS):
             pit = self._draw(rng, ends, gear.face_width)
             loss = np.maximum(loss, patch_loss(sliced, pit))
+            edge = np.maximum(edge, patch_edge(sliced, pit))
             if float(cell_area[loss > 0.0].sum()) >= self.pitted_share:
-                return sliced.with_loss(loss)
+                raised = np.where(loss > 0.0, 0.0, edge)
+                return sliced.with_loss(loss).with_deviation(-raised)
         raise FaultError(
             f"{MOST_PITS} pits of {self.pit_diameter * 1e3:g} mm do not make fault.pitted_share = "
             f"{self.pitted_share:g}; increase fault.pit_diameter_mm"
@@ -227,4 +251,6 @@ class DistributedPitting(Fault):
             depth=self.depth_ratio * diameter,
             abscissa=low + share * (high - low),
             face_position=face_width * rng.random(),
+            edge_height=self.pit_edge_height,
+            edge_width=self.pit_edge_width,
         )

@@ -18,6 +18,7 @@ from gensig.faults.flank_form import (
     Wear,
 )
 from gensig.faults.pitting import DistributedPitting, Pitting, Spalling
+from gensig.faults.surface_damage import SurfaceDamage
 from gensig.units import read
 
 FAULTS: dict[str, type[Fault]] = {
@@ -27,6 +28,7 @@ FAULTS: dict[str, type[Fault]] = {
         Pitting,
         Spalling,
         DistributedPitting,
+        SurfaceDamage,
         ChippedTooth,
         BrokenTooth,
         MissingTooth,
@@ -39,6 +41,15 @@ FAULTS: dict[str, type[Fault]] = {
     )
 }
 COMPOUND = "compound"
+# Keys that came after 0.9.0, by kind; 0, their default, is the fault as it was before. There they
+# are no part of a configuration, so that plans and data sets are as they were.
+LATER_KEYS = {
+    "pitting": ("pit_edge_height_um", "pit_edge_width_mm"),
+    "spalling": ("spall_edge_height_um", "spall_edge_width_mm"),
+    "distributed_pitting": ("pit_edge_height_um", "pit_edge_width_mm"),
+    "chipped": ("chip_edge_height_um", "chip_edge_width_mm"),
+    "broken": ("broken_edge_height_um", "broken_edge_width_mm"),
+}
 
 
 def fault_parts(
@@ -81,6 +92,26 @@ def without_vary(values: Mapping[str, Any]) -> dict[str, Any]:
     if values.get("kind") == COMPOUND:
         fixed["parts"] = [{**part, "vary": {}} for part in fault_parts(values)]
     return fixed
+
+
+def without_later_keys(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The fault values, with parts, without keys of ``LATER_KEYS`` that are 0 and not drawn."""
+    later = LATER_KEYS.get(str(values.get("kind")), ())
+    drawn = values.get("vary") or {}
+    kept = {
+        key: value
+        for key, value in values.items()
+        if key not in later or value != 0 or key in drawn
+    }
+    if values.get("kind") == COMPOUND:
+        kept["parts"] = [without_later_keys(part) for part in fault_parts(values)]
+    return kept
+
+
+def with_later_keys(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The fault values with every key of ``LATER_KEYS``, 0 where they have none."""
+    later = LATER_KEYS.get(str(values.get("kind")), ())
+    return {**dict.fromkeys(later, 0), **values}
 
 
 def _read_fault(values: Mapping[str, Any], where: str) -> Fault:

@@ -11,7 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from gensig.errors import ConfigError
-from gensig.faults.registry import COMPOUND, FAULTS, fault_parts
+from gensig.faults.registry import (
+    COMPOUND,
+    FAULTS,
+    fault_parts,
+    without_later_keys,
+)
 from gensig.life.life_options import RUN_TO_FAILURE
 from gensig.options.configuration import Configuration
 from gensig.options.groups import options
@@ -118,9 +123,10 @@ def _request(source: Source, overrides: tuple[str, ...]) -> Request:
         notes.append(
             f"pinned, no longer varied: {', '.join(f'{key} = {words.keys[key]}' for key in pinned)}"
         )
-    base["fault"] = copy.deepcopy(selected.option)
+    base["fault"] = without_later_keys(copy.deepcopy(selected.option))
     base["classes"] = {
-        name: copy.deepcopy(fault.option) for name, fault in faults.items()
+        name: without_later_keys(copy.deepcopy(fault.option))
+        for name, fault in faults.items()
     }
     _reset_derived(base["gear"], set(words.keys) | set(base["plan"]["vary"]))
     config = settle_courses(Configuration(base), source.pinned_keys())

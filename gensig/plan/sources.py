@@ -13,6 +13,7 @@ from typing import Any, final
 from gensig.dataset.folder.layout import CONFIG, read_config_file
 from gensig.dataset.folder.manifest import SINCE_0_9
 from gensig.errors import ConfigError, DatasetError
+from gensig.faults.registry import with_later_keys
 from gensig.options import files as option_files
 from gensig.options.compose import compose
 from gensig.options.stored import changed_content
@@ -182,6 +183,11 @@ def read_stored(path: str | Path) -> dict[str, Any]:
         section, _, key = dotted.partition(".")
         if isinstance(content.get(section), dict):
             content[section].setdefault(key, default)
+    if isinstance(content.get(FAULT), dict):
+        content[FAULT] = with_later_keys(content[FAULT])
+    for name, fault in content[CLASSES].items():
+        if isinstance(fault, dict):
+            content[CLASSES][name] = with_later_keys(fault)
     return content
 
 

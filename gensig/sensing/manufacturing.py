@@ -49,7 +49,8 @@ class Quality:
     Misalignment is uniform within plus and minus ``misalignment``, backlash within plus and minus
     the share ``backlash_scatter`` of the nominal one. The support scatters are standard
     deviations of the logarithm. Where the damping ratios are given, each support of a gearbox has
-    one between them, and their scatter is not read.
+    one between them, and their scatter is not read. Running-in has worn off ``run_in_share`` of
+    the profile deviations and of the random pitch, not of eccentricity and misalignment.
     """
 
     iso1328_grade: float | None
@@ -65,6 +66,7 @@ class Quality:
     support_damping_scatter: float
     support_damping_ratio_low: float | None = None
     support_damping_ratio_high: float | None = None
+    run_in_share: float = 0.0
 
     def __post_init__(self) -> None:
         if (
@@ -79,7 +81,7 @@ class Quality:
             raise ConfigError(
                 "quality.used_share_low and used_share_high must be ordered and lie in 0..1"
             )
-        shares = ("tooth_share", "undulation_share", "backlash_scatter")
+        shares = ("tooth_share", "undulation_share", "backlash_scatter", "run_in_share")
         limits = dict.fromkeys((*shares, *SUPPORT_SCATTERS), (0.0, 1.0))
         check_limits(self, "quality.", **limits, undulation_waves=(1, 50))
         if self.misalignment < 0.0:
@@ -295,14 +297,15 @@ def _draw_gear(
         gear, quality.iso1328_grade, share, runout_share, angle, shape
     )
     turn = 2.0 * math.pi / gear.n_teeth * np.arange(gear.n_teeth) - angle
+    left = 1.0 - quality.run_in_share
     # the same turning point of an eccentric gear for all teeth in contact: its teeth do not step,
     # see the theory
-    error = eccentricity * np.cos(turn) + pitch_error
+    error = eccentricity * np.cos(turn) + left * pitch_error
     tilt = -eccentricity / gear.base_radius * np.sin(turn)
     if not quality.profile_errors:
         return GearErrors(error=error, tilt=tilt)
-    slope = share * profile_slope_limit(gear, quality.iso1328_grade)
-    form = share * profile_form_limit(gear, quality.iso1328_grade)
+    slope = left * share * profile_slope_limit(gear, quality.iso1328_grade)
+    form = left * share * profile_form_limit(gear, quality.iso1328_grade)
     involute = (
         math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
         - gear.junction_curvature_radius

@@ -127,7 +127,7 @@ def single_pair(
     faults: Sequence[Fault],
     whole: Mapping[str, Tooth],
 ) -> SinglePair:
-    """The pair of each gear's first faulty tooth, or of a sound one, under the whole load.
+    """The pair of each gear's first changed tooth, or of a sound one, under the whole load.
 
     Half of the contact term of sound flanks belongs to either gear. An increase by a fault belongs
     to the faulty gear.
@@ -140,7 +140,11 @@ def single_pair(
     bending = slice_bending(pair, position, material, mesh)
     terms, gap, touches = {}, np.zeros_like(position), np.ones_like(position)
     for name, side in sides.items():
-        mine = {number: tooth for (gear, number), tooth in odd.items() if gear == name}
+        mine = {
+            number: tooth
+            for (gear, number), tooth in odd.items()
+            if gear == name and tooth is not whole[name]
+        }
         firsts = [fault.first_tooth for fault in faults if fault.gear == name]
         named = [number for number in firsts if number in mine]
         tooth = whole[name]

@@ -132,6 +132,12 @@ class TestSets:
         assert vary["sensing.snr_db"]["levels"] is None
         assert config["operating"]["duration_s"] * 600 / 60 >= 10
 
+    def test_added_grids_have_their_own_fault_and_no_crack(self):
+        for grid in sets.GRIDS[1:]:
+            config = read_request(sets.yardstick_words(BASE, TINY, grid)).config
+            assert tuple(config["plan"]["classes"]) == grid.classes
+        assert config["quality"]["run_in_share"] == sets.RUN_IN_SHARE
+
     def test_cracks_are_a_quarter_to_half_of_the_chord(self):
         config = read_request(sets.yardstick_words(BASE, TINY)).config
         spec = config["classes"]["crack"]["vary"]["crack_depth_mm"]
@@ -232,6 +238,7 @@ class TestRecording:
     [
         ("--stored", "--frozen COMMIT"),
         ("--stored --quick --frozen 0123abc", "too few units"),
+        ("--added", "it needs --stored"),
     ],
 )
 def test_storing_needs_the_commit_and_all_units(words, message, capsys):

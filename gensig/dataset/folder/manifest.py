@@ -40,6 +40,7 @@ SINCE_0_9 = {
     "plan.machines": "crossed",
     "plan.fault_gear": "as_given",
     "plan.n_reference": 0,
+    "quality.run_in_share": 0,
 }
 RECEIPT_SUFFIX = ".done"
 

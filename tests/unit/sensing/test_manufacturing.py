@@ -198,6 +198,23 @@ class TestWhatIsDrawn:
         assert max(single_pitch) <= 0.9
         assert np.ptp(single_pitch) > 0.4
 
+    def test_running_in_leaves_the_eccentricity_alone(self, xiamen, quality):
+        cut, half, worn = (
+            draw(xiamen.pair, quality(run_in_share=share)) for share in (0.0, 0.5, 1.0)
+        )
+        for name in GEARS:
+            first, second, last = (
+                getattr(specimen, f"{name}_error") for specimen in (cut, half, worn)
+            )
+            assert_allclose(second, 0.5 * (first + last), atol=1e-12)
+            amplitude = once_per_turn(first)[0]
+            assert_allclose(once_per_turn(last)[0], amplitude, rtol=1e-9)
+            # nothing but the circle is left
+            assert_allclose(last.std(), amplitude / np.sqrt(2.0), atol=1e-12)
+        assert [len(specimen.forms) > 0 for specimen in (cut, worn)] == [True, False]
+        slopes = [specimen.forms[0].profile_slope for specimen in (cut, half)]
+        assert_allclose(slopes[1], 0.5 * slopes[0])
+
     def test_tilts_without_slopes_are_those_of_an_eccentric_circle(self, xiamen, drawn):
         """Eccentricity is in the once-per-turn part of the offsets, once; they have no mean."""
         for specimen in drawn(10, tooth_share=0.0):
@@ -420,6 +437,7 @@ def test_gearbox_factors_scatter_as_the_quality_says(quality):
     ("key", "value", "text"),
     [
         ("iso1328_grade", 12, " = 12 must lie in 1..11, or be null"),
+        ("run_in_share", 1.5, " = 1.5 must lie in 0..1"),
         ("used_share_low", 0.95, " and used_share_high must be ordered"),
         ("support_damping_scatter", -0.1, " = -0.1 must lie in 0..1"),
         ("tooth_share", 1.1, " = 1.1 must lie in 0..1"),
