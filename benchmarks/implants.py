@@ -64,6 +64,9 @@ CHANNEL = "housing_input"
 N_CARRIERS = 6  # of the machine's ten healthy records
 KINDS = ("physics", "noise_bursts", "shuffled_phases", "none")
 N_IMPLANTS = 240
+PLAIN_HEALTHY = (
+    0.5  # share of the healthy records without a residual, in the arms named so
+)
 NETWORK = {
     "name": "cnn",
     "kind": "small_cnn",
@@ -162,8 +165,10 @@ def arms(
 ) -> Iterator[tuple[str, tuple[list[np.ndarray], np.ndarray]]]:
     """Training signals, (1, sample) each, and labels by the name of the arm."""
     yield "simulations alone", simulations(source)
-    choices = [("twin", kind) for kind in KINDS] + [("none", "physics")]
-    for path, kind in choices:
+    choices = [("twin", kind, 0.0) for kind in KINDS]
+    choices += [("none", "physics", 0.0)]
+    choices += [("twin", kind, PLAIN_HEALTHY) for kind in KINDS[:3]]
+    for path, kind, plain in choices:
         made = implant_records(
             source,
             judged.carriers,
@@ -171,6 +176,7 @@ def arms(
             speed_rpm=speed,
             options=ImplantOptions(
                 n_records=N_IMPLANTS,
+                plain_healthy=plain,
                 residual=kind,
                 path=path,
                 duration=0.5,
@@ -178,6 +184,8 @@ def arms(
             ),
         )
         words = f"{kind}, no path" if path == "none" else kind
+        if plain:
+            words += ", plain healthy"
         yield words, (list(made.acceleration), made.label)
 
 
