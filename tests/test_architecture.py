@@ -58,7 +58,7 @@ def test_import_is_light(statement: str, absent: tuple[str, ...]) -> None:
 # Allow-list: the folders of its own package that a folder or a module of the top level imports.
 GENSIG = {
     "cli": "commands compilation terminal version",
-    "commands": "dataset driveline dynamics errors execution faults geometry life mesh "
+    "commands": "dataset driveline dynamics errors execution faults geometry implants life mesh "
     "operation options papers plan production record report signals systems terminal text "
     "twin units",
     "dataset": "errors signals version",
@@ -70,6 +70,7 @@ GENSIG = {
     "execution": "errors options",
     "faults": "errors geometry units",
     "geometry": "errors units",
+    "implants": "dataset errors signals version",
     "life": "errors faults geometry material mesh options units",
     "material": "errors units",
     "mesh": "compilation errors geometry material options units",
