@@ -30,6 +30,7 @@ GROUPS = {
     "machines": (
         "new",
         "twin",
+        "measured",
         "simulate",
         "run-up",
         "modes",
