@@ -23,6 +23,7 @@ VERBS = {
     "predict": "try a trained network on a recording",
     "export": "write a trained network as ONNX",
     "adapt": "move a trained network to a machine by its healthy recordings",
+    "bridge": "what a simulation is worth on a measured machine, with comparators",
     "detectability": "which test shows a fault: maps over speed, torque, channel and bandwidth",
     "score": "score predictions of your own, beside a frozen benchmark",
 }
