@@ -19,8 +19,8 @@ from gensig.sensing.agreement import third_octave_bands, third_octave_power
 from gensig.signals.indicators import crest_factor, kurtosis, rms
 from gensig.signals.mesh_motion import Motion, Teeth
 from gensig.signals.recording import Recording
+from gensig.signals.transfer.order_lines import find_lines
 from gensig.twin.grade import median_of_finite, sideband_ratios
-from gensig.twin.lines import find_lines
 
 Array = NDArray[np.float64]
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from gensig.errors import SimulationError
 from gensig.sensing.manufacturing import draw_specimen
 from gensig.signals.mesh_motion import Teeth
+from gensig.signals.transfer.order_lines import Lines, find_lines
 from gensig.systems.base import Machine, simulate_together
 from gensig.systems.run import CleanRecord, Run, Start
-from gensig.twin.lines import Lines, find_lines
 
 Array = NDArray[np.float64]
 

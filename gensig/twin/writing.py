@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from gensig.errors import ConfigError
+from gensig.signals.transfer.path_gain import minimum_phase
 from gensig.text.option_writing import is_option_name, option_lines
-from gensig.twin.fitting import SOURCE_CHANNEL, Fit, minimum_phase, oversampling
+from gensig.twin.fitting import SOURCE_CHANNEL, Fit, oversampling
 
 # Hz between the lines of the path's file; its gain is smooth over a sixth of an octave
 PATH_STEP = 20.0

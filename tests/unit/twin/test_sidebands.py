@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.signals.mesh_motion import Teeth
+from gensig.signals.transfer.order_lines import find_lines
 from gensig.twin.grade import sideband_ratios
-from gensig.twin.lines import find_lines
 
 TEETH = Teeth(driving=20, driven=31)
 RATE, MESH_HZ = 12800.0, 400.0

@@ -12,7 +12,7 @@ from gensig.dataset.reader import open_dataset
 from gensig.plan.request import read_request
 from gensig.signals.mesh_motion import Teeth
 from gensig.signals.recording import Recording
-from gensig.twin.fitting import gain_at, minimum_phase
+from gensig.signals.transfer.path_gain import gain_at, minimum_phase
 from gensig.twin.speed import find_motion
 
 BOTH = Teeth(driving=TEETH[0], driven=TEETH[1])

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics.decimation import usable_band
 from gensig.signals.mesh_motion import Teeth
+from gensig.signals.resampling import PASS_SHARE
 
 Array = NDArray[np.float64]
 
@@ -125,7 +125,7 @@ def _floor(power: Array, is_line: NDArray[np.bool_]) -> Array:
 
 def band_centers(lowest: float, sampling_rate: float) -> Array:
     """Centers of overlapping bands, twelve an octave, up to the usable band's end, (band,) Hz."""
-    highest = usable_band(sampling_rate)[1]
+    highest = PASS_SHARE * sampling_rate
     n_bands = max(2, math.floor(BANDS_AN_OCTAVE * math.log2(highest / lowest)) + 1)
     return np.asarray(highest * 2.0 ** (np.arange(-n_bands + 1, 1) / BANDS_AN_OCTAVE))
 

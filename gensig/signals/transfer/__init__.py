@@ -1,0 +1,1 @@
+"""The path from a machine's bearings to a sensor, as a healthy recording shows it."""
