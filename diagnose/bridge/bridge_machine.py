@@ -6,6 +6,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from diagnose.bridge.protocol import BridgeProtocol
 from gensig.errors import ConfigError
 from gensig.measured.measured_set import (
@@ -100,11 +102,15 @@ def bridge_machine(
     """
     name = _chosen(found, machine)
     recordings = found.of_machine(name)
-    usable = [one for one in recordings if one.label is not None and not one.speed_varies]
+    usable = [
+        one for one in recordings if one.label is not None and not one.speed_varies
+    ]
     left_out = Counter(
         {
             NO_LABEL: sum(one.label is None for one in recordings),
-            VARYING: sum(one.speed_varies and one.label is not None for one in recordings),
+            VARYING: sum(
+                one.speed_varies and one.label is not None for one in recordings
+            ),
         }
     )
     _check_known(found, usable)
@@ -128,7 +134,9 @@ def _chosen(found: MeasuredSet, machine: str | None) -> str:
     """Name of the machine to judge."""
     names = found.machines()
     if machine is not None and machine not in names:
-        raise ConfigError(f"{found.name}: no machine '{machine}'; there is {', '.join(names)}")
+        raise ConfigError(
+            f"{found.name}: no machine '{machine}'; there is {', '.join(names)}"
+        )
     if machine is not None:
         return machine
 
@@ -148,18 +156,21 @@ def _check_known(found: MeasuredSet, usable: Sequence[MeasuredRecording]) -> Non
             f"{found.name}: a bridge needs healthy and faulty recordings of steady speed; it has "
             f"{has}"
         )
-    facts = {
-        "sampling_rate_hz": [one.sampling_rate for one in usable],
-        "speed_rpm": [one.shaft_frequency for one in usable],
-        "stages": [one.train for one in usable],
-    }
-    missing = [key for key, values in facts.items() if None in values]
+    missing = [
+        key
+        for key, lacks in {
+            "sampling_rate_hz": any(one.sampling_rate is None for one in usable),
+            "speed_rpm": any(one.shaft_frequency is None for one in usable),
+            "stages": any(one.train is None for one in usable),
+        }.items()
+        if lacks
+    ]
     if missing:
         reason = found.missing.get(missing[0], "not given")
         raise ConfigError(
             f"{found.name}: {', '.join(missing)} must be given in measured.yaml ({reason})"
         )
-    if len(set(facts["stages"])) > 1:
+    if len({one.train for one in usable}) > 1:
         raise ConfigError(
             f"{found.name}: its recordings are of several gear trains; name each with machine"
         )
@@ -175,7 +186,7 @@ def _at_rate(signal: Recording, protocol: BridgeProtocol) -> Recording:
     change = rate_change(signal.sampling_rate, protocol.highest_rate)
     return replace(
         signal,
-        acceleration=change.apply(kept),
+        acceleration=np.asarray(change.apply(kept), dtype=np.float64),
         sampling_rate=signal.sampling_rate * change.ratio,
     )
 

@@ -27,7 +27,12 @@ from diagnose.studies.result_files import environment, write_rows
 from gensig.measured.measured_set import MeasuredSet
 from gensig.text.page import Section, Table, write_page
 
-PAGE, MARKDOWN, NUMBERS, ANSWERS = "bridge.html", "bridge.md", "bridge.json", "answers.csv"
+PAGE, MARKDOWN, NUMBERS, ANSWERS = (
+    "bridge.html",
+    "bridge.md",
+    "bridge.json",
+    "answers.csv",
+)
 SCORE_HEAD = (
     "method",
     "balanced accuracy",
@@ -80,7 +85,13 @@ def bridge_sections(
     """Sections of the page."""
     compared = comparisons(result)
     table = Table(
-        head=("against", "difference", "95 % by recording", "95 % by specimen", "verdict"),
+        head=(
+            "against",
+            "difference",
+            "95 % by recording",
+            "95 % by specimen",
+            "verdict",
+        ),
         rows=[
             (
                 one.method,
@@ -133,7 +144,15 @@ def _recordings(found: MeasuredSet, result: BridgeResult) -> Section:
             f"{left_out or 'none'}.",
         ],
         table=Table(
-            head=("recording", "class", "label", "specimen", "speed, r/min", "load", "sha256"),
+            head=(
+                "recording",
+                "class",
+                "label",
+                "specimen",
+                "speed, r/min",
+                "load",
+                "sha256",
+            ),
             rows=[
                 (
                     one.name,

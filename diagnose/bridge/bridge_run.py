@@ -124,7 +124,11 @@ def run_bridge(
 
 
 def _implants_of(
-    method: str, machine: BridgeMachine, data: Dataset, protocol: BridgeProtocol, seed: int
+    method: str,
+    machine: BridgeMachine,
+    data: Dataset,
+    protocol: BridgeProtocol,
+    seed: int,
 ) -> Implanted:
     """Training windows of a method."""
     residual = {"noise bursts": BURSTS, "gain 0": NO_RESIDUAL}.get(method, PHYSICS)

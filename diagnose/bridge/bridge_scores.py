@@ -43,13 +43,17 @@ class Judged:
         """(recording,) number of the group that is drawn: its own, or that of its specimen."""
         if kind == RECORDINGS:
             return np.arange(len(self.names))
-        known = {name: number for number, name in enumerate(dict.fromkeys(self.specimen))}
+        known = {
+            name: number for number, name in enumerate(dict.fromkeys(self.specimen))
+        }
         return np.array([known[name] for name in self.specimen])
 
     def fewest(self, kind: str) -> int:
         """Groups of the class that has fewest."""
         group = self.groups(kind)
-        return min(np.unique(group[self.label == one]).size for one in np.unique(self.label))
+        return min(
+            np.unique(group[self.label == one]).size for one in np.unique(self.label)
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +104,9 @@ def advantage(
     judged: Judged, predicted: IntArray, other: IntArray, *, n_bootstrap: int
 ) -> Interval:
     """Balanced accuracy less that of another method on the same recordings."""
-    hits = (predicted == judged.label).mean(axis=0) - (other == judged.label).mean(axis=0)
+    hits = (predicted == judged.label).mean(axis=0) - (other == judged.label).mean(
+        axis=0
+    )
     return _interval(judged, hits, n_bootstrap)
 
 

@@ -16,7 +16,12 @@ from diagnose.bridge.bridge_scores import (
     specimen_counts,
 )
 
-BEATS, ON_THESE, NOT_TOLD, WORSE = "beats", "on these recordings", "not told apart", "worse"
+BEATS, ON_THESE, NOT_TOLD, WORSE = (
+    "beats",
+    "on these recordings",
+    "not told apart",
+    "worse",
+)
 OF_OTHERS = "of other specimens nothing is known"
 
 
@@ -121,9 +126,7 @@ def _summary(verdicts: list[Comparison]) -> str:
     if weak:
         return f"Physics does not beat: {', '.join(weak)}."
     if here:
-        return (
-            f"Physics is ahead of every comparator on these recordings; {OF_OTHERS}."
-        )
+        return f"Physics is ahead of every comparator on these recordings; {OF_OTHERS}."
     return "Physics beats every comparator, over specimens."
 
 
@@ -170,7 +173,12 @@ def ranked_rows(result: BridgeResult) -> list[tuple[str, str, str, str, str]]:
         )
         by_specimen = interval_text(score.by_specimen)
         rows.append(
-            (method, f"{score.mean:.2f}", interval_text(score.by_recording), by_specimen, area)
+            (
+                method,
+                f"{score.mean:.2f}",
+                interval_text(score.by_recording),
+                by_specimen,
+                area,
+            )
         )
     return rows
-

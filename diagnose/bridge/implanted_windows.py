@@ -167,7 +167,9 @@ def judged_stretches(machine: BridgeMachine, blocks: Sequence[Block]) -> list[St
     """
     stretches = []
     for number, sample in enumerate(machine.healthy):
-        free = [block for block in blocks if block.recording == number and not block.carries]
+        free = [
+            block for block in blocks if block.recording == number and not block.carries
+        ]
         if free:
             start = min(block.start for block in free)
             stop = max(block.stop for block in free)

@@ -54,12 +54,24 @@ class BridgeProtocol:
         low, high = self.gain_db
         return [
             ("version", str(self.version)),
-            ("window", f"{self.window_turns:g} turns of the slowest shaft, half of it overlaps"),
+            (
+                "window",
+                f"{self.window_turns:g} turns of the slowest shaft, half of it overlaps",
+            ),
             ("rate", f"as recorded, at most {self.highest_rate:g} Hz"),
             ("length", f"the first {self.most_seconds:g} s of a recording"),
-            ("healthy recordings", f"cut into time blocks; the last {self.held_out:.0%} held out"),
-            ("implants", f"{self.n_records} records a training, of {self.record_windows:g} windows"),
-            ("gain", f"{low:g} to {high:g} dB over the carrier's RMS, for every class alike"),
+            (
+                "healthy recordings",
+                f"cut into time blocks; the last {self.held_out:.0%} held out",
+            ),
+            (
+                "implants",
+                f"{self.n_records} records a training, of {self.record_windows:g} windows",
+            ),
+            (
+                "gain",
+                f"{low:g} to {high:g} dB over the carrier's RMS, for every class alike",
+            ),
             ("path", f"{self.path}"),
             ("network", f"cnn, windows normalised by {self.normalise}"),
             (
@@ -68,7 +80,10 @@ class BridgeProtocol:
                 f"{self.validation_every} for early stopping",
             ),
             ("seeds", ", ".join(map(str, self.seeds))),
-            ("wrong gearbox", f"all teeth times {self.wrong_teeth:g}, the same mesh frequency"),
+            (
+                "wrong gearbox",
+                f"all teeth times {self.wrong_teeth:g}, the same mesh frequency",
+            ),
             ("intervals", f"95 %, {self.n_bootstrap} resamples within each class"),
         ]
 

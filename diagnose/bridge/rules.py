@@ -15,7 +15,9 @@ from gensig.measured.measured_set import LABELS
 from gensig.signals.handbook_rule import handbook_answer
 
 
-def carrying_stretches(samples: Sequence[Sample], blocks: Sequence[Block]) -> list[Stretch]:
+def carrying_stretches(
+    samples: Sequence[Sample], blocks: Sequence[Block]
+) -> list[Stretch]:
     """Stretches of the healthy recordings that carry: what a method may learn from."""
     stretches = []
     for number, sample in enumerate(samples):
@@ -40,7 +42,9 @@ def handbook_answers(healthy: Sequence[Stretch], judged: Sequence[Stretch]) -> A
     ]
     predicted = np.array([[LABELS.index(answer.state) for answer in answers]])
     # the more of the two alarms, so that a curve can be drawn
-    faulty = np.array([[max(one.kurtosis / 6.0, one.level_db / 3.0) for one in answers]])
+    faulty = np.array(
+        [[max(one.kurtosis / 6.0, one.level_db / 3.0) for one in answers]]
+    )
     return Answers(predicted=predicted, faulty=faulty)
 
 

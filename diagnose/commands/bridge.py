@@ -71,7 +71,9 @@ def run(arguments: Namespace) -> int:
     if arguments.data is None:
         print("no --data: a source of residuals for this machine is made by")
         print("\n".join(f"  {line}" for line in source_lines(machine)))
-        print("module and torque are assumed where the set does not tell them: give yours")
+        print(
+            "module and torque are assumed where the set does not tell them: give yours"
+        )
         return 0
     if arguments.out is None:
         raise ConfigError("--out is missing; give the folder to write")
