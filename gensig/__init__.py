@@ -23,6 +23,7 @@ from gensig.version import __version__
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
     from gensig.faults.base import Fault
+    from gensig.implants.implanting import Given
     from gensig.production.fault_pairs import FaultPairs
     from gensig.production.streaming import RecordStream
     from gensig.systems.base import Machine
@@ -31,6 +32,7 @@ __all__ = [
     "__version__",
     "fault_pairs",
     "generate",
+    "implant",
     "load_faults",
     "load_system",
     "open_dataset",
@@ -220,3 +222,74 @@ def fault_pairs(
         fixed_noise=fixed_noise,
         epoch=epoch,
     )
+
+
+def implant(
+    data: str | Path,
+    recordings: Sequence[Given],
+    *,
+    out: str | Path,
+    teeth: Sequence[int],
+    speed_rpm: float | Sequence[float],
+    gain_db: tuple[float, float] = (-10.0, 10.0),
+    path: str = "twin",
+    residual: str = "physics",
+    n_records: int = 600,
+    duration_s: float | None = None,
+    held_out: float = 0.25,
+    seed: int = 0,
+) -> Dataset:
+    """Make a data set of healthy recordings plus residuals of simulated faults, and open it.
+
+    `gensig.implants.implanting.implant_records` returns them in memory.
+
+    Parameters
+    ----------
+    data : folder of a data set without noise and with healthy twins (``sensing.snr_db=null
+           dataset.store_healthy_twin=true``)
+    recordings : healthy recordings of one machine: files that tell their rate in m/s2, or
+                 `gensig.signals.recording.Recording`
+    out : folder that does not exist or is empty
+    teeth : driving and driven gear of each stage in turn
+    speed_rpm : r/min of the driving shaft, within 3 %: one, or one a recording
+    gain_db : dB, ends of the uniform law of a residual's RMS over its carrier's
+    path : ``twin`` fits the response from the simulated sensor as ``gensig twin``, ``none`` does
+           not
+    residual : ``physics``, or a control: ``noise_bursts``, ``shuffled_phases``, ``none``
+    n_records : of the set
+    duration_s : of a record; None follows the length of the recordings
+    held_out : share of the blocks of each recording, its last ones, that carry nothing
+    seed : every drawn number follows from it
+
+    Returns
+    -------
+    Dataset    of the classes healthy, one_tooth and many_teeth, as far as ``data`` has them
+
+    Raises
+    ------
+    gensig.errors.GensigError    for anything that cannot be used
+    """
+    from gensig.implants.gearing import Gearing
+    from gensig.implants.implant_folder import write_implants
+    from gensig.implants.implanting import Implanter, speeds_of, taken_recordings
+    from gensig.implants.options import ImplantOptions
+
+    options = ImplantOptions(
+        gain_db=gain_db,
+        path=path,
+        residual=residual,
+        n_records=n_records,
+        duration=duration_s,
+        held_out=held_out,
+        seed=seed,
+    )
+    with open_dataset(data) as source:
+        implanter = Implanter(
+            source,
+            taken_recordings(recordings),
+            Gearing(teeth=tuple(teeth)),
+            speeds_of(speed_rpm),
+            options,
+        )
+        write_implants(Path(out), implanter, typed=[])
+    return open_dataset(out)

@@ -117,6 +117,74 @@ TWIN = (
     text("--check", "FILE", "healthy recording held out (default: the second half)"),
 )
 
+IMPLANT = (
+    text("folder", "DATA", "simulated data set without noise, with healthy twins"),
+    text("words", "out=DIR", "folder that does not exist or is empty", nargs="*"),
+    OUT,
+    text(
+        "--healthy",
+        "FILE",
+        "needed; healthy recordings: .csv, .npy, .npz, .wav, .h5, .mat",
+        nargs="+",
+    ),
+    counts("--teeth", "Z", "needed; driving and driven gear, of each stage in turn"),
+    numbers(
+        "--speed-rpm",
+        "RPM",
+        "needed; of the driving shaft, within 3 %%; one, or one a recording",
+    ),
+    number("--sampling-rate", "HZ", "of the files, where they do not tell"),
+    text("--channels", "NAME", "columns to use (default: all)", nargs="+"),
+    Argument(
+        ("--unit",),
+        {
+            "default": "m/s2",
+            "help": "m/s2 or g, where the column does not say (default: m/s2)",
+        },
+    ),
+    text(
+        "--array", "NAME", "array of a .npz, .h5 or .mat file (default: acceleration)"
+    ),
+    text(
+        "--tacho",
+        "NAME",
+        "channel with the pulses of the driving shaft (default: mesh)",
+    ),
+    count("--pulses-per-turn", "N", "of it (default: 1)", default=1),
+    numbers(
+        "--gain-db",
+        ("LOW", "HIGH"),
+        "level of a residual over its carrier, uniform (default: -10 10)",
+    ),
+    Argument(
+        ("--path",),
+        {
+            "choices": ("twin", "none"),
+            "default": "twin",
+            "help": "response from the simulated sensor: fitted as by gensig twin, or left out "
+            "(default: twin)",
+        },
+    ),
+    Argument(
+        ("--residual",),
+        {
+            "choices": ("physics", "noise_bursts", "shuffled_phases", "none"),
+            "default": "physics",
+            "help": "what is implanted: physics, or a control (default: physics)",
+        },
+    ),
+    count("--records", "N", "of the set (default: 600)", default=600),
+    number("--duration", "S", "of a record (default: by the length of the recordings)"),
+    number(
+        "--held-out",
+        "SHARE",
+        "of the blocks of each recording, its last ones, that carry nothing (default: 0.25)",
+        default=0.25,
+    ),
+    count("--seed", "N", "of what is drawn (default: 0)", default=0),
+    QUIET,
+)
+
 SET_VERBS = {
     "options": Verb(
         summary="groups, their options, and the keys of an option, a line each",
@@ -315,6 +383,19 @@ OTHER_VERBS = {
         ),
         runs="gensig.commands.sets.twin:twin",
         arguments=TWIN,
+    ),
+    "implant": Verb(
+        summary="a labelled data set: your healthy recordings plus residuals of simulated faults",
+        examples=(
+            "gensig generate experiment=quickstart sensing.snr_db=null plan.n_reference=0"
+            " dataset.store_healthy_twin=true"
+            " plan.classes=[healthy,missing_tooth,distributed_pitting] out=runs/faults",
+            "gensig implant runs/faults out=runs/mine --teeth 29 95 36 90 --speed-rpm 1480"
+            " --healthy monday.csv tuesday.csv",
+            "diagnose train data=runs/mine out=runs/mine_report model=cnn",
+        ),
+        runs="gensig.commands.sets.implant:implant",
+        arguments=IMPLANT,
     ),
     "completion": Verb(
         summary="what to source so that the tab key completes both commands",

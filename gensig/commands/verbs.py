@@ -16,6 +16,7 @@ GROUPS = {
         "inspect",
         "report",
         "export",
+        "implant",
         "completion",
     ),
     "gears": (

@@ -18,6 +18,8 @@ from gensig.dataset.storage.compression import creation_options
 from gensig.errors import DatasetError
 from gensig.version import __version__
 
+IMPLANTS = "implants"  # section of the configuration of a set of implants
+
 
 def joined_folder(
     out: Path, *, asked: ConfigContent | None = None
@@ -59,7 +61,7 @@ def agreed_folder(
     Raises
     ------
     DatasetError    for another version, a configuration that was changed (with the keys that
-                    differ), and a compression whose package is missing
+                    differ), a set of implants, and a compression whose package is missing
     """
     manifest, config = read_manifest(out), read_config(out)
     if manifest.generator_version != __version__:
@@ -80,6 +82,11 @@ def agreed_folder(
         raise DatasetError(
             f"{out} was begun with another {_listed(keys)}; leave that out, or start a new "
             "folder: only executor.* may change"
+        )
+    if IMPLANTS in config:
+        raise DatasetError(
+            f"{out} is made of recordings, which no simulation makes again: `gensig verify` "
+            "checks it, the same `gensig implant` into another folder makes it anew"
         )
     creation_options(config["dataset"]["compression"])  # its package may be missing
     return manifest, config
