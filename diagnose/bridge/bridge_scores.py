@@ -6,7 +6,6 @@ how sure the score is for these gears, and nothing of others.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,10 +63,12 @@ class Answers:
     ----------
     predicted : (seed, recording) index of the answered label; None for a method that names no class
     faulty : (seed, recording) larger where a fault is likelier
+    alarm : (recording,) True where a method that names no class calls it changed; None for others
     """
 
     predicted: IntArray | None
     faulty: FloatArray
+    alarm: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,8 +179,3 @@ def specimen_counts(judged: Judged) -> dict[str, int]:
 def says_nothing_of_others(judged: Judged) -> bool:
     """True where some class present has a single specimen."""
     return min(specimen_counts(judged).values()) == 1
-
-
-def as_log_probability(rows: Sequence[FloatArray]) -> FloatArray:
-    """(seed, recording, class) of one array a seed."""
-    return np.stack([np.asarray(row, dtype=float) for row in rows])

@@ -143,7 +143,19 @@ def _detection_lines(result: BridgeResult) -> list[str]:
     )
     if novelty >= ours:
         line += " Detection needs no simulation here."
-    return [line]
+    return [line, *_alarm_lines(result)]
+
+
+def _alarm_lines(result: BridgeResult) -> list[str]:
+    """Recordings that novelty calls changed, of the healthy and of the faulty ones."""
+    alarm = result.answers[NOVELTY].alarm
+    if alarm is None:
+        return []
+    sound = result.judged.label == 0
+    return [
+        f"Novelty calls changed: {alarm[sound].sum()} of {sound.sum()} healthy and "
+        f"{alarm[~sound].sum()} of {(~sound).sum()} faulty recordings."
+    ]
 
 
 def interval_text(interval: tuple[float, float] | None, *, sign: str = "") -> str:
