@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gensig.dataset.cards.card import plain
+from gensig.dataset.cards.origin import origin_of
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.dataset.storage.atomic import write_bytes
 from gensig.errors import ConfigError
@@ -130,7 +131,7 @@ def report_text(data: Dataset, per_class: int | None) -> tuple[str, str]:
         *tables.loading(data),
         *tables.provenance(data),
     ]
-    version = plain(data.manifest.generator_version)
+    version, origin = plain(data.manifest.generator_version), origin_of(data.manifest)
     n_classes = len(data.class_names)
     classes = "1 class"
     if n_classes > 1:
@@ -138,7 +139,7 @@ def report_text(data: Dataset, per_class: int | None) -> tuple[str, str]:
     page = interactive_page(
         title=f"Data set {plain(data.folder.resolve().name)}",
         lead=[
-            f"{data.n_records} records of {classes}, simulated and labelled by gensig "
+            f"{data.n_records} records of {classes}. {origin.made} by gensig "
             f"{version}. This page stands alone: it fetches nothing."
         ],
         sections=sections,

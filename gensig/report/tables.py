@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gensig.dataset.cards.card import (
-    CAVEATS,
+    caveats_of,
     plain,
     torque_words,
 )
@@ -267,7 +267,7 @@ def loading(data: Dataset) -> list[Section]:
     text = ["Every shard is plain HDF5 too: h5py, MATLAB and Octave read it."]
     caveats = [
         " ".join(line.replace("`", "").split())
-        for line in CAVEATS.removeprefix("- ").split("\n- ")
+        for line in caveats_of(data).removeprefix("- ").split("\n- ")
     ]
     return [
         Section(title="Load it", text=text, code="\n".join(code)),

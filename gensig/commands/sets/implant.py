@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Callable
 from pathlib import Path
 
 from gensig.commands.console import step
@@ -14,6 +15,7 @@ from gensig.implants.gearing import Gearing
 from gensig.implants.implant_folder import write_implants
 from gensig.implants.implanting import Implanter, taken_recordings
 from gensig.implants.options import ImplantOptions
+from gensig.terminal.run_progress import Progress, RunProgress
 
 OUT_WORD = "out="
 NEEDED = {"healthy": "--healthy", "teeth": "--teeth", "speed_rpm": "--speed-rpm"}
@@ -60,7 +62,12 @@ def implant(arguments: Namespace) -> int:
         )
         if not arguments.quiet:
             step(_made_of(implanter))
-        write_implants(out, implanter, typed=_typed(arguments))
+        with RunProgress(
+            quiet=arguments.quiet, n_records=options.n_records
+        ) as progress:
+            write_implants(
+                out, implanter, typed=_typed(arguments), tell=_shown(progress)
+            )
     if not arguments.quiet:
         print(
             f"{out}: {options.n_records} records; gensig inspect {out} describes them"
@@ -80,6 +87,21 @@ def held_out_lines(blocks: tuple[Block, ...]) -> list[str]:
         f"held out, for scores: {file} samples {held[0].start} to {held[-1].stop}"
         for file, held in parts.items()
     ]
+
+
+def _shown(progress: RunProgress) -> Callable[[int, int], None]:
+    def show(n_done: int, n_records: int) -> None:
+        state = Progress(
+            n_done=n_done,
+            n_records=n_records,
+            n_failed=0,
+            n_made=n_done,
+            n_bytes=0,
+            reason="",
+        )
+        progress(state)
+
+    return show
 
 
 def _made_of(implanter: Implanter) -> str:

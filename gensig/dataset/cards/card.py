@@ -11,6 +11,7 @@ import yaml
 from gensig.dataset.cards.class_figures import write_class_figures
 from gensig.dataset.cards.croissant import croissant_text
 from gensig.dataset.cards.facts import geometry_facts, value_range
+from gensig.dataset.cards.origin import origin_of
 from gensig.dataset.folder.layout import CARD, CROISSANT, SHARDS
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.dataset.splitting.splits import SUBSETS
@@ -45,17 +46,10 @@ TAGS = (
     "fault-diagnosis",
     "condition-monitoring",
     "time-series",
-    "synthetic",
-    "simulation",
 )
 
-LICENCE = """Data licence: CC BY 4.0 (https://creativecommons.org/licenses/by/4.0/): \
-free to use, name the source.
-"""
-
-CAVEATS = """- The records are simulated. \
-A model trained on them alone has proved nothing about measured signals.
-- `random_window_leaky` puts windows of one record on every side on purpose. Never report it
+CAVEATS = """- `random_window_leaky` puts windows of one record on every side on purpose. \
+Never report it
   without a clean split beside it.
 - The speed and the signal power of a record are results: \
 a fault may change them. Report results with and
@@ -72,7 +66,7 @@ def write_card(out: Path, *, figures: bool = True) -> None:
     """Write `README.md`, its figures and `croissant.json` of a folder whose shards are done."""
     with open_dataset(out, allow_incomplete=True) as data:
         pictures = write_class_figures(data) if figures else {}
-        write_text(out / CROISSANT, croissant_text(data, CAVEATS))
+        write_text(out / CROISSANT, croissant_text(data, caveats_of(data)))
         write_text(out / CARD, card_text(data, pictures))
 
 
@@ -83,11 +77,11 @@ def card_text(data: Dataset, pictures: Mapping[str, str] | None = None) -> str:
     ----------
     pictures : path in the folder by class name
     """
-    version = escape(data.manifest.generator_version)
+    version, origin = escape(data.manifest.generator_version), origin_of(data.manifest)
     sections = [
         front_matter(data),
         f"# {escape(data.folder.resolve().name)}",
-        f"Gear vibration, simulated and labelled by gensig {version}.",
+        f"{origin.made} by gensig {version}.",
         table(("fact", "value"), set_facts(data)),
         "## Classes",
         table(("class", "records", "severity"), class_rows(data)),
@@ -97,11 +91,16 @@ def card_text(data: Dataset, pictures: Mapping[str, str] | None = None) -> str:
         "## Load it",
         LOAD,
         "## Caveats",
-        CAVEATS,
+        caveats_of(data),
         "## Licence",
-        LICENCE,
+        origin.license_text,
     ]
     return "\n\n".join(section.strip() for section in sections if section) + "\n"
+
+
+def caveats_of(data: Dataset) -> str:
+    """Caveats of a data set, by its origin, as a Markdown list."""
+    return f"{origin_of(data.manifest).caveat}\n{CAVEATS}"
 
 
 def _gallery(pictures: Mapping[str, str]) -> str:
@@ -129,12 +128,16 @@ def front_matter(data: Dataset) -> str:
 def hub_facts(data: Dataset, n_rows: int) -> dict[str, object]:
     """Name, licence, task, tags and size of ``n_rows`` rows, by the keys of the hub."""
     sizes = [name for limit, name in SIZES if n_rows < limit]
-    size = (*sizes, "n>10M")[0]
+    size, origin = (*sizes, "n>10M")[0], origin_of(data.manifest)
     return {
         "pretty_name": plain(data.folder.resolve().name),
-        "license": "cc-by-4.0",
+        "license": origin.license_name,
         "task_categories": ["tabular-classification"],
-        "tags": [*TAGS, f"gensig-{plain(data.manifest.generator_version)}"],
+        "tags": [
+            *TAGS,
+            *origin.tags,
+            f"gensig-{plain(data.manifest.generator_version)}",
+        ],
         "size_categories": [size],
     }
 

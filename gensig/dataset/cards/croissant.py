@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from gensig.dataset.cards.facts import kind_of_machine
+from gensig.dataset.cards.origin import origin_of
 from gensig.dataset.columns import COLUMNS
 from gensig.dataset.folder.layout import MANIFEST, PLAN, SHARDS, SPLITS
 from gensig.dataset.plan import Plan
@@ -61,7 +62,7 @@ def croissant_text(data: Dataset, caveats: str) -> str:
 
     `caveats` as limitations.
     """
-    manifest = data.manifest
+    manifest, origin = data.manifest, origin_of(data.manifest)
     name = "".join(c if c.isprintable() else " " for c in data.folder.resolve().name)
     facts = (
         f"{data.n_records} records of {data.n_samples} samples at {data.sampling_rate:g} Hz, "
@@ -76,20 +77,20 @@ def croissant_text(data: Dataset, caveats: str) -> str:
         ],
         "name": name,
         "description": (
-            f"Gear vibration, simulated and labelled by gensig {manifest.generator_version}: "
-            f"{facts}."
+            f"{origin.made} by gensig {manifest.generator_version}: {facts}."
         ),
-        "license": "https://creativecommons.org/licenses/by/4.0/",
+        "license": origin.license_address,
         "version": "1.0.0",
-        "keywords": ["vibration", "gear", "fault diagnosis", "synthetic"],
+        "keywords": ["vibration", "gear", "fault diagnosis", origin.tags[0]],
         "isLiveDataset": False,
         "citeAs": (
-            f"{name}: simulated gear vibration, gensig {manifest.generator_version}, "
+            f"{name}: {origin.kind}, gensig {manifest.generator_version}, "
             f"{manifest.identity[:16]}"
         ),
         "datePublished": str(manifest.environment.get("created", ""))[:10]
         or "1970-01-01",
         **_responsible_ai(data, facts, caveats),
+        **origin.responsible,
         "distribution": _distribution(data),
         "recordSet": [_plan_records(data.plan)],
     }

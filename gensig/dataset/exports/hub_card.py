@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from gensig.dataset.cards.card import (
-    LICENCE,
     class_rows,
     escape,
     hub_facts,
@@ -13,6 +12,7 @@ from gensig.dataset.cards.card import (
     table,
     yaml_block,
 )
+from gensig.dataset.cards.origin import origin_of
 from gensig.dataset.exports.export_tables import unit_of
 from gensig.dataset.exports.hub_features import Feature, card_features
 from gensig.dataset.exports.split_columns import is_clean
@@ -52,10 +52,8 @@ before `stop_sample`, in
 samples of the record. No sample is in two rows.
 """
 
-CAVEATS = """- The records are simulated. A model trained on them alone has proved nothing about \
-measured signals.
-- Inputs of a classifier are signals, and at most columns of role condition. Columns of role \
-label, fault or
+CAVEATS = """- Inputs of a classifier are signals, and at most columns of role condition. \
+Columns of role label, fault or
   result and those that begin with `params/` must not be inputs.
 - The speed and the signal power of a record are results: a fault may change them. Report results \
 with and
@@ -112,13 +110,13 @@ class HubConfig:
 
 def hub_card(data: Dataset, configs: Sequence[HubConfig]) -> str:
     """Card as Markdown after front matter, with text from files escaped."""
-    version = escape(data.manifest.generator_version)
+    version, origin = escape(data.manifest.generator_version), origin_of(data.manifest)
     facts = [row for row in set_facts(data) if row[0] not in OF_SHARDS]
     header = ("configuration", "apart in its subsets", *SUBSETS, "records left out")
     sections = [
         _front_matter(data, configs),
         f"# {escape(data.folder.resolve().name)}",
-        f"Gear vibration, simulated and labelled by gensig {version}, with its splits.",
+        f"{origin.made} by gensig {version}, with its splits.",
         table(("fact", "value"), facts),
         "## Classes",
         table(("class", "records", "severity"), class_rows(data)),
@@ -131,9 +129,9 @@ def hub_card(data: Dataset, configs: Sequence[HubConfig]) -> str:
         "## Columns",
         table(("column", "unit", "role", "meaning"), _column_rows(data, configs)),
         "## Caveats",
-        CAVEATS,
+        f"{origin.caveat}\n{CAVEATS}",
         "## Licence",
-        LICENCE,
+        origin.license_text,
     ]
     return "\n\n".join(section.strip() for section in sections if section) + "\n"
 
