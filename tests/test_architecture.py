@@ -108,6 +108,7 @@ DIAGNOSE = {
     "bridge": "data detection report scoring settings studies training",
     "commands": "bridge data detectability progress recordings report settings studies training workers",
     "detectability": "workers",
+    "detection": "data recordings",
     "networks": "data",
     "recordings": "baselines data networks report scoring studies training",
     "report": "baselines data scoring studies training",

@@ -23,7 +23,7 @@ ONE_SPECIMEN = "one specimen a class: says nothing about others"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """What stands behind every score: the recordings that were judged.
+    """Recordings that were judged, with their labels and specimens.
 
     Attributes
     ----------

@@ -92,7 +92,7 @@ def _of_interval(interval: tuple[float, float], above: str) -> str:
 
 
 def headline(result: BridgeResult) -> list[str]:
-    """What the run says in a few sentences, the weaknesses first."""
+    """Result of the run in a few sentences, the weaknesses first."""
     lines = [specimen_sentence(result)]
     verdicts = comparisons(result)
     lines.append(_summary(verdicts))
@@ -131,7 +131,7 @@ def _summary(verdicts: list[Comparison]) -> str:
 
 
 def _detection_lines(result: BridgeResult) -> list[str]:
-    """What detection does without any simulation."""
+    """Share of pairs that detection without any simulation separates."""
     if NOVELTY not in result.answers:
         reason = result.why_not.get(NOVELTY, "it was not run")
         return [f"Novelty gives no answer: {reason}."]
