@@ -33,18 +33,21 @@ if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
 OnStep = Callable[[str], None]
+OURS, NOISE, WRONG_GEARBOX = "implants", "noise bursts", "wrong gearbox"
+NOTHING, SHUFFLED = "gain 0", "shuffled labels"
+HANDBOOK, NOVELTY = "handbook rule", "novelty"
+RESIDUALS = {NOISE: BURSTS, NOTHING: NO_RESIDUAL}
 # name of a method -> its meaning, in the order of the page
 METHODS = {
-    "implants": "network on the machine's healthy recordings plus simulated residuals",
-    "noise bursts": "the same with bursts of noise once a turn in place of residuals",
-    "wrong gearbox": "the same with simulated residuals on shafts that the machine has not",
-    "gain 0": "the same with nothing added: the three classes are the same",
-    "shuffled labels": "simulated residuals with labels that tell nothing",
-    "handbook rule": "kurtosis over 6 is one tooth, level 3 dB over healthy is many; no training",
-    "novelty": "distance from the healthy recordings; no simulation, no fault, names no class",
+    OURS: "network on the machine's healthy recordings plus simulated residuals",
+    NOISE: "the same with bursts of noise once a turn in place of residuals",
+    WRONG_GEARBOX: "the same with simulated residuals on shafts that the machine has not",
+    NOTHING: "the same with nothing added: the three classes are the same",
+    SHUFFLED: "simulated residuals with labels that tell nothing",
+    HANDBOOK: "kurtosis over 6 is one tooth, level 3 dB over healthy is many; no training",
+    NOVELTY: "distance from the healthy recordings; no simulation, no fault, names no class",
 }
-NETWORKS = tuple(METHODS)[:5]
-OURS, HANDBOOK, NOVELTY = "implants", "handbook rule", "novelty"
+NETWORKS = (OURS, NOISE, WRONG_GEARBOX, NOTHING, SHUFFLED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +90,12 @@ def run_bridge(
     ------
     ConfigError, DatasetError    with one line, for recordings or a set that cannot be used
     """
-    first = implanted(machine, data, protocol, residual=PHYSICS, seed=protocol.seeds[0])
+    on_step("implants in the healthy recordings")
+    physics = [
+        implanted(machine, data, protocol, residual=PHYSICS, seed=seed)
+        for seed in protocol.seeds
+    ]
+    first = physics[0]
     stretches = judged_stretches(machine, first.blocks)
     windows = judged_windows(stretches, first.window_samples, protocol)
     judged = Judged(
@@ -100,9 +108,9 @@ def run_bridge(
     answers: dict[str, Answers] = {}
     for method in NETWORKS:
         rows = []
-        for seed in protocol.seeds:
+        for seed, own in zip(protocol.seeds, physics, strict=True):
             on_step(f"{method}, seed {seed}")
-            implants = _implants_of(method, machine, data, protocol, seed)
+            implants = _implants_of(method, own, machine, data, protocol, seed)
             rows.append(network_answers(implants, windows, settings, seed))
         answers[method] = _of_network(np.stack(rows))
     healthy = carrying_stretches(machine.healthy, first.blocks)
@@ -125,24 +133,22 @@ def run_bridge(
 
 def _implants_of(
     method: str,
+    physics: Implanted,
     machine: BridgeMachine,
     data: Dataset,
     protocol: BridgeProtocol,
     seed: int,
 ) -> Implanted:
-    """Training windows of a method."""
-    residual = {"noise bursts": BURSTS, "gain 0": NO_RESIDUAL}.get(method, PHYSICS)
-    implants = implanted(
-        machine,
-        data,
-        protocol,
-        residual=residual,
-        seed=seed,
-        wrong_gearbox=method == "wrong gearbox",
+    """Training windows of a method; `physics` are those of the implants with the same seed."""
+    if method == OURS:
+        return physics
+    if method == SHUFFLED:
+        return with_shuffles(physics, seed)
+    is_wrong = method == WRONG_GEARBOX
+    residual = PHYSICS if is_wrong else RESIDUALS[method]
+    return implanted(
+        machine, data, protocol, residual=residual, seed=seed, wrong_gearbox=is_wrong
     )
-    if method == "shuffled labels":
-        return with_shuffles(implants, seed)
-    return implants
 
 
 def _of_network(log_probability: np.ndarray) -> Answers:

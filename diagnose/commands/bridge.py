@@ -111,8 +111,8 @@ def source_lines(machine: BridgeMachine) -> list[str]:
     return [
         f"gensig new gearbox bridge --teeth {teeth} --module 2 --speed {speed:g} --torque 20 "
         "--no-level",
-        f"gensig generate experiment=bridge plan.classes=[{FAULTS}] sensing.snr_db=null "
-        "dataset.store_healthy_twin=true out=runs/residuals",
+        f"gensig generate experiment=bridge plan.classes=[{FAULTS}] plan.n_reference=0 "
+        "sensing.snr_db=null dataset.store_healthy_twin=true out=runs/residuals",
     ]
 
 
