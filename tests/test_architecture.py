@@ -102,8 +102,10 @@ GENSIG = {
 }
 DIAGNOSE = {
     "baselines": "data networks scoring",
-    "commands": "data detectability progress recordings report settings studies training workers",
+    "commands": "data detectability detection progress recordings report settings studies "
+    "training workers",
     "detectability": "workers",
+    "detection": "data recordings",
     "networks": "data",
     "recordings": "baselines data networks report scoring studies training",
     "report": "baselines data scoring studies training",

@@ -233,9 +233,7 @@ def _features(
     yield impulsive("highest foreign line of the envelope", _foreign(spectra, to))
 
 
-def _levels(
-    spectra: _Spectra, to: Layout
-) -> Iterator[tuple[Feature, FloatArray]]:
+def _levels(spectra: _Spectra, to: Layout) -> Iterator[tuple[Feature, FloatArray]]:
     """Levels of bands and mesh harmonics."""
     kinds = (("", spectra.power), (" of the rest", spectra.rest_power))
     for low, high in zip(to.edges[:-1], to.edges[1:], strict=True):
@@ -264,7 +262,10 @@ def _of_shaft(
         mesh = to.stages.mesh_orders[gear.stage]
         most = min(SIDEBAND_HARMONICS, to.n_harmonics[gear.stage])
         for harmonic in range(1, most + 1):
-            lines = [harmonic * mesh + side * order for side in (*steps, *(-s for s in steps))]
+            lines = [
+                harmonic * mesh + side * order
+                for side in (*steps, *(-s for s in steps))
+            ]
             feature = Feature(
                 name=f"sidebands of harmonic {harmonic} of stage {gear.stage + 1}",
                 group=SIDEBANDS,

@@ -189,9 +189,7 @@ class HealthyMachine:
         with_levels = far <= SAME_SPEED and not other_load
         judge = self.with_levels if with_levels else self.without_levels
         finding = answer_of(followed, own, self.references, judge)
-        return replace(
-            finding, notes=(*self._notes(far, other_load), *finding.notes)
-        )
+        return replace(finding, notes=(*self._notes(far, other_load), *finding.notes))
 
     def _speed_difference(self, recording: BlockedRecording) -> float:
         """Relative difference of the speed from that of the nearest reference."""
@@ -237,8 +235,5 @@ def _known(references: References, is_one_session: bool) -> NDArray[np.bool_]:
 
     Changes against a turn of the same session tell nothing about those against another session.
     """
-    known = [
-        not (is_one_session and "change" in feature.name or "unlike" in feature.name)
-        for feature in references.features
-    ]
-    return np.array(known)
+    is_change = np.array(["change" in one.name for one in references.features])
+    return ~is_change if is_one_session else np.ones_like(is_change)

@@ -180,7 +180,7 @@ def make_judge(
         columns=columns,
         folds=tuple(folds),
         scale=scale,
-        threshold=threshold_of(scores, false_alarms),
+        threshold=threshold_of(scores.tolist(), false_alarms),
         held_back=scores,
     )
 

@@ -18,7 +18,7 @@ TINY = 1e-30
 # name of a feature of a turn -> group
 NAMES = {
     "highest tooth of the change": TEETH,
-    "share unlike healthy": TEETH,
+    "share of the change": TEETH,
     "kurtosis of the change": TEETH,
     "highest tooth": TEETH,
     "kurtosis": TEETH,
