@@ -45,7 +45,7 @@ class Feature:
     name : in words
     group : kind of change that it shows
     part : number of its stage or shaft; 0 where it has none
-    is_level : True if speed, load and the sensor's mounting change it
+    is_level : True if speed, load or the sensor's mounting change it
     """
 
     name: str
@@ -230,7 +230,13 @@ def _features(
     yield impulsive("kurtosis", _db(kurtosis(signal)))
     yield impulsive("kurtosis of the rest", _db(kurtosis(rest)))
     yield impulsive("crest factor of the rest", 2.0 * _db(crest_factor(rest)))
-    yield impulsive("highest foreign line of the envelope", _foreign(spectra, to))
+    feature = Feature(
+        name="highest foreign line of the envelope",
+        group=IMPULSES,
+        part=0,
+        is_level=True,
+    )
+    yield feature, _foreign(spectra, to)
 
 
 def _levels(spectra: _Spectra, to: Layout) -> Iterator[tuple[Feature, FloatArray]]:
@@ -279,7 +285,7 @@ def _of_shaft(
         )
         yield feature, _db(spectra.at(spectra.power, [step * order]))
     feature = Feature(
-        name="lines of the envelope", group=TEETH, part=shaft, is_level=False
+        name="lines of the envelope", group=SIDEBANDS, part=shaft, is_level=True
     )
     lines = [step * order for step in steps]
     yield feature, _db(spectra.at(spectra.envelope, lines))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,6 +122,11 @@ class Judge:
     def groups(self) -> tuple[Group, ...]:
         """Groups in the order of `ratios`."""
         return tuple(self.columns)
+
+    def looser(self, factor: float) -> Judge:
+        """The same with a limit that is so many times as wide."""
+        value = self.threshold.value * factor
+        return replace(self, threshold=replace(self.threshold, value=value))
 
     def ratios(self, measured: Measured) -> FloatArray:
         """(block, group) distance over its limit, mean over the folds."""
