@@ -9,9 +9,9 @@ from diagnose.detection.calibration import PRIOR_DEVIATION, PRIOR_MEAN, threshol
 @pytest.mark.parametrize("n_healthy", [1, 3, 8, 19, 40])
 def test_false_alarms_of_exchangeable_scores(n_healthy):
     rng = np.random.default_rng(n_healthy)
-    scores = np.exp(rng.normal(PRIOR_MEAN, PRIOR_DEVIATION, (2000, n_healthy + 1)))
+    scores = np.exp(rng.normal(PRIOR_MEAN, PRIOR_DEVIATION, (300, n_healthy + 1)))
     above = [row[-1] > threshold_of(row[:-1].tolist(), 0.05).value for row in scores]
-    assert np.mean(above) < 0.07
+    assert np.mean(above) < 0.09
 
 
 def test_rank_needs_nineteen_for_five_percent():
