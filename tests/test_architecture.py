@@ -106,7 +106,8 @@ GENSIG = {
 DIAGNOSE = {
     "baselines": "data networks scoring",
     "bridge": "data detection report scoring settings studies training",
-    "commands": "bridge data detectability progress recordings report settings studies training workers",
+    "commands": "bridge data detectability detection progress recordings report settings "
+    "studies training workers",
     "detectability": "workers",
     "detection": "data recordings",
     "networks": "data",

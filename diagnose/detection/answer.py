@@ -30,10 +30,16 @@ from gensig.signals.indicators import rms
 FloatArray = NDArray[np.floating]
 
 SHOWN = 3  # features of a group that are named
-LOCAL_DB = 6.0  # assumed: a tooth is named where it stands this much over the median tooth
-REMOUNTED = (
-    "levels changed in the bands and every mesh while no turn changed its shape: a sensor mounted "
-    "anew, another load and wear of whole gears look so; check the mounting, or give --mounting"
+KINDS: dict[str, Kind] = {
+    BROADBAND: "broadband",
+    MESH: "mesh",
+    SIDEBANDS: "shaft",
+    TEETH: "shaft",
+    IMPULSES: "impulses",
+}
+LEVEL_ALONE = (
+    "levels changed and no shape did: like a sensor mounted anew, another load, or wear of whole "
+    "gears; check the mounting, or give --mounting"
 )
 
 
@@ -66,7 +72,8 @@ def answer_of(
     place = None
     if kind == "shaft":
         place = _place(_changed_shaft(by_group), recording, references)
-    notes = (REMOUNTED,) if kind == "like_remounted_sensor" else ()
+    is_level_alone = score > 1.0 and not _has_new_shape(by_group)
+    notes = (LEVEL_ALONE,) if is_level_alone else ()
     own_score = score * judge.threshold.value
     n_higher = int(np.sum(judge.held_back >= own_score))
     return Finding(
@@ -74,6 +81,7 @@ def answer_of(
         is_changed=score > 1.0,
         score=score,
         kind=kind,
+        is_level_alone=is_level_alone,
         changes=tuple(sorted(groups, key=lambda change: -change.ratio)),
         place=place,
         level_db=float(20.0 * np.log10((rms(followed.signal) / levels).max())),
@@ -87,27 +95,21 @@ def answer_of(
     )
 
 
-def _kind(by_group: dict[Group, float]) -> Kind:
-    """Kind of a change from the ratios of the groups.
+def _has_new_shape(by_group: dict[Group, float]) -> bool:
+    """True if a group changed that a mounting leaves alone."""
+    return any(
+        ratio > 1.0 and group[0] in (TEETH, IMPULSES)
+        for group, ratio in by_group.items()
+    )
 
-    Shapes come first: a mounting changes levels alone.
-    """
-    shapes = {g: r for g, r in by_group.items() if g[0] in (TEETH, IMPULSES)}
-    beyond = {g for g, ratio in by_group.items() if ratio > 1.0}
-    if any(group in beyond for group in shapes):
-        first = max(shapes, key=lambda group: shapes[group])
-        return "shaft" if first[0] == TEETH else "impulses"
-    meshes = {group for group in by_group if group[0] == MESH}
-    if (BROADBAND, 0) in beyond and meshes <= beyond:
-        return "like_remounted_sensor"
-    first = max(by_group, key=lambda group: by_group[group])
-    kinds: dict[str, Kind] = {
-        MESH: "mesh",
-        SIDEBANDS: "shaft",
-        TEETH: "shaft",
-        IMPULSES: "impulses",
-    }
-    return kinds.get(first[0], "broadband")
+
+def _kind(by_group: dict[Group, float]) -> Kind:
+    """Kind of a change from the ratios of the groups; new shapes come before levels."""
+    counted = by_group
+    if _has_new_shape(by_group):
+        counted = {g: r for g, r in by_group.items() if g[0] in (TEETH, IMPULSES)}
+    first = max(counted, key=lambda group: counted[group])
+    return KINDS[first[0]]
 
 
 def _changed_shaft(by_group: dict[Group, float]) -> int:

@@ -45,7 +45,7 @@ class Feature:
     name : in words
     group : kind of change that it shows
     part : number of its stage or shaft; 0 where it has none
-    is_level : True if speed, load and the sensor's mounting change it
+    is_level : True if speed, load or the sensor's mounting change it
     """
 
     name: str
@@ -230,12 +230,16 @@ def _features(
     yield impulsive("kurtosis", _db(kurtosis(signal)))
     yield impulsive("kurtosis of the rest", _db(kurtosis(rest)))
     yield impulsive("crest factor of the rest", 2.0 * _db(crest_factor(rest)))
-    yield impulsive("highest foreign line of the envelope", _foreign(spectra, to))
+    feature = Feature(
+        name="highest foreign line of the envelope",
+        group=IMPULSES,
+        part=0,
+        is_level=True,
+    )
+    yield feature, _foreign(spectra, to)
 
 
-def _levels(
-    spectra: _Spectra, to: Layout
-) -> Iterator[tuple[Feature, FloatArray]]:
+def _levels(spectra: _Spectra, to: Layout) -> Iterator[tuple[Feature, FloatArray]]:
     """Levels of bands and mesh harmonics."""
     kinds = (("", spectra.power), (" of the rest", spectra.rest_power))
     for low, high in zip(to.edges[:-1], to.edges[1:], strict=True):
@@ -264,7 +268,10 @@ def _of_shaft(
         mesh = to.stages.mesh_orders[gear.stage]
         most = min(SIDEBAND_HARMONICS, to.n_harmonics[gear.stage])
         for harmonic in range(1, most + 1):
-            lines = [harmonic * mesh + side * order for side in (*steps, *(-s for s in steps))]
+            lines = [
+                harmonic * mesh + side * order
+                for side in (*steps, *(-s for s in steps))
+            ]
             feature = Feature(
                 name=f"sidebands of harmonic {harmonic} of stage {gear.stage + 1}",
                 group=SIDEBANDS,
@@ -278,7 +285,7 @@ def _of_shaft(
         )
         yield feature, _db(spectra.at(spectra.power, [step * order]))
     feature = Feature(
-        name="lines of the envelope", group=TEETH, part=shaft, is_level=False
+        name="lines of the envelope", group=SIDEBANDS, part=shaft, is_level=True
     )
     lines = [step * order for step in steps]
     yield feature, _db(spectra.at(spectra.envelope, lines))

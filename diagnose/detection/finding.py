@@ -7,9 +7,7 @@ from typing import Literal
 
 from gensig.signals.handbook_rule import HandbookAnswer
 
-Kind = Literal[
-    "healthy", "shaft", "mesh", "broadband", "impulses", "like_remounted_sensor"
-]
+Kind = Literal["healthy", "shaft", "mesh", "broadband", "impulses"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +74,9 @@ class Finding:
     name : of the recording
     is_changed : True if the score is above 1
     score : distance from the healthy recordings over its limit; larger is less healthy
-    kind : of the change
+    kind : of the change: of a shaft's turn or sidebands, of a mesh's level, of bands, or impulses
+        of no shaft
+    is_level_alone : True for a change of levels and no shape, as a sensor mounted anew makes it
     changes : of all groups, the most changed first
     place : on the shaft that changed most; None where no shaft did
     level_db : dB, RMS over healthy, of the channel in which it rose most
@@ -92,6 +92,7 @@ class Finding:
     is_changed: bool
     score: float
     kind: Kind
+    is_level_alone: bool
     changes: tuple[GroupChange, ...]
     place: ToothPlace | None
     level_db: float

@@ -154,12 +154,15 @@ def _check_place(
     best, *others = search.near
     said = f"--teeth {stages.said} at {speed_rpm:g} r/min"
     far = search.elsewhere
-    if far is not None and far.decades >= LEAST_ELSEWHERE:
-        if best.decades < NEAR_SHARE * far.decades:
-            raise ConfigError(
-                f"{name}: no mesh of {said}, but one as of {far.speed_rpm:.5g} r/min with these "
-                f"teeth: another machine or speed? check {OPTIONS}"
-            )
+    if (
+        far is not None
+        and far.decades >= LEAST_ELSEWHERE
+        and best.decades < NEAR_SHARE * far.decades
+    ):
+        raise ConfigError(
+            f"{name}: no mesh of {said}, but one as of {far.speed_rpm:.5g} r/min with these "
+            f"teeth: another machine or speed? check {OPTIONS}"
+        )
     rivals = [other for other in others if other.decades >= AMBIGUOUS * best.decades]
     if rivals and best.decades >= LEAST_DECADES:
         speeds = ", ".join(f"{one.speed_rpm:.5g}" for one in (best, *rivals))

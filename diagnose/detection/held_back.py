@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,6 +123,11 @@ class Judge:
         """Groups in the order of `ratios`."""
         return tuple(self.columns)
 
+    def looser(self, factor: float) -> Judge:
+        """The same with a limit that is so many times as wide."""
+        value = self.threshold.value * factor
+        return replace(self, threshold=replace(self.threshold, value=value))
+
     def ratios(self, measured: Measured) -> FloatArray:
         """(block, group) distance over its limit, mean over the folds."""
         over_folds = [
@@ -180,7 +185,7 @@ def make_judge(
         columns=columns,
         folds=tuple(folds),
         scale=scale,
-        threshold=threshold_of(scores, false_alarms),
+        threshold=threshold_of(scores.tolist(), false_alarms),
         held_back=scores,
     )
 

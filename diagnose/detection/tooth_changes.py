@@ -15,15 +15,15 @@ from gensig.signals.indicators import kurtosis
 FloatArray = NDArray[np.floating]
 
 TINY = 1e-30
-# name of a feature of a turn -> group
+# name of a feature of a turn -> group, and True where speed and load change it
 NAMES = {
-    "highest tooth of the change": TEETH,
-    "share unlike healthy": TEETH,
-    "kurtosis of the change": TEETH,
-    "highest tooth": TEETH,
-    "kurtosis": TEETH,
-    "level of the change": SIDEBANDS,
-    "level": SIDEBANDS,
+    "highest tooth of the change": (TEETH, False),
+    "share of the change": (TEETH, True),
+    "kurtosis of the change": (TEETH, False),
+    "highest tooth": (TEETH, False),
+    "kurtosis": (TEETH, False),
+    "level of the change": (SIDEBANDS, True),
+    "level": (SIDEBANDS, True),
 }
 
 
@@ -91,9 +91,9 @@ def fewest_teeth(to: Layout, shaft: int) -> int:
 def tooth_features(to: Layout) -> tuple[Feature, ...]:
     """Names of the values of `tooth_values`."""
     return tuple(
-        Feature(name=name, group=group, part=shaft, is_level=group == SIDEBANDS)
+        Feature(name=name, group=group, part=shaft, is_level=is_level)
         for shaft in range(len(to.stages.shaft_orders))
-        for name, group in NAMES.items()
+        for name, (group, is_level) in NAMES.items()
     )
 
 
