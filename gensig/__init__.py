@@ -237,6 +237,7 @@ def implant(
     n_records: int = 600,
     duration_s: float | None = None,
     held_out: float = 0.25,
+    plain_healthy: float = 0.0,
     seed: int = 0,
 ) -> Dataset:
     """Make a data set of healthy recordings plus residuals of simulated faults, and open it.
@@ -259,6 +260,7 @@ def implant(
     n_records : of the set
     duration_s : of a record; None follows the length of the recordings
     held_out : share of the blocks of each recording, its last ones, that carry nothing
+    plain_healthy : share of the healthy records that carry nothing
     seed : every drawn number follows from it
 
     Returns
@@ -281,6 +283,7 @@ def implant(
         n_records=n_records,
         duration=duration_s,
         held_out=held_out,
+        plain_healthy=plain_healthy,
         seed=seed,
     )
     with open_dataset(data) as source:

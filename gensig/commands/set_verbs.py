@@ -181,6 +181,12 @@ IMPLANT = (
         "of the blocks of each recording, its last ones, that carry nothing (default: 0.25)",
         default=0.25,
     ),
+    number(
+        "--plain-healthy",
+        "SHARE",
+        "of the healthy records that carry nothing (default: 0)",
+        default=0.0,
+    ),
     count("--seed", "N", "of what is drawn (default: 0)", default=0),
     QUIET,
 )

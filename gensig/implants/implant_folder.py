@@ -104,6 +104,7 @@ def configuration(implanter: Implanter) -> dict[str, Any]:
             "residual": options.residual,
             "duration_s": options.duration,
             "held_out_share": options.held_out,
+            "plain_healthy_share": options.plain_healthy,
             "recordings": recordings,
             "blocks": blocks_content(implanter.cut.blocks),
         },

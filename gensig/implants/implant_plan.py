@@ -39,7 +39,7 @@ class Draw:
     second : number of another of the same gears, for a residual of two healthy records
     source_gear : gear of the simulated machine whose turns are taken
     channel : number of the simulated channel for the first of the carrier's; the next for the next
-    gain_db : dB    level of the residual over the carrier's
+    gain_db : dB    level of the residual over the carrier's; NaN where it carries nothing
     shift, second_shift : share of the simulated signal at which it begins
     """
 
@@ -173,6 +173,9 @@ def _draw(
     second = int(rng.choice(others)) if len(others) else source
     gears = gearing.of_role(pairs.role(source_gear))
     gain = float(rng.uniform(*options.gain_db))
+    carries = options.residual != "none"
+    if name == HEALTHY and options.plain_healthy > 0.0:
+        carries = carries and rng.uniform() >= options.plain_healthy
     shift, second_shift = rng.uniform(0.0, 1.0, 2).tolist()
     return Draw(
         name=name,
@@ -183,7 +186,7 @@ def _draw(
         second=second,
         source_gear=source_gear,
         channel=int(rng.choice(np.array(pairs.channels))),
-        gain_db=float("nan") if options.residual == "none" else gain,
+        gain_db=gain if carries else float("nan"),
         shift=shift,
         second_shift=second_shift,
     )

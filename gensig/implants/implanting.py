@@ -61,7 +61,7 @@ class Implants:
     acceleration : (record, channel, sample) float32, m/s^2
     label : (record,) index into `class_names`
     class_names : classes of which there are records
-    gain_db : (record,) dB    level of the residual over the carrier's
+    gain_db : (record,) dB    level of the residual over the carrier's; NaN where there is none
     block : (record,) number of the block that carries
     blocks : all blocks, those held out among them
     draws : everything drawn for each record
@@ -130,7 +130,7 @@ class Implanter:
         """One record, (channel, sample) m/s^2; it depends on nothing but the plan."""
         draw = self.plan.draws[index]
         carrier = self.stretch(index)
-        if self.options.residual == "none":
+        if np.isnan(draw.gain_db):
             return carrier.astype(np.float32)
         rng = random_stream(self.options.seed, RECORD_STREAM, index)
         residual = self._residual(draw, rng)

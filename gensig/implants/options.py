@@ -24,6 +24,7 @@ class ImplantOptions:
     n_records : of the set
     duration : s    of a record; None is by the length of the recordings
     held_out : share of the blocks of each recording, its last ones, that carry nothing
+    plain_healthy : share of the healthy records that carry nothing, as the machine itself does
     seed : every drawn number follows from it
 
     Raises
@@ -37,6 +38,7 @@ class ImplantOptions:
     n_records: int = 600
     duration: float | None = None
     held_out: float = 0.25
+    plain_healthy: float = 0.0
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -62,6 +64,10 @@ class ImplantOptions:
         if not 0.0 < self.held_out < 1.0:
             raise ConfigError(
                 f"--held-out {self.held_out:g} must be a share between 0 and 1"
+            )
+        if not 0.0 <= self.plain_healthy <= 1.0:
+            raise ConfigError(
+                f"--plain-healthy {self.plain_healthy:g} must be a share from 0 to 1"
             )
         if self.seed < 0:
             raise ConfigError(f"--seed {self.seed} must not be negative")

@@ -39,6 +39,7 @@ def implant(arguments: Namespace) -> int:
         n_records=arguments.records,
         duration=arguments.duration,
         held_out=arguments.held_out,
+        plain_healthy=arguments.plain_healthy,
         seed=arguments.seed,
     )
     gearing = Gearing(teeth=tuple(arguments.teeth))

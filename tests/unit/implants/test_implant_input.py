@@ -93,6 +93,7 @@ def test_classes_follow_the_number_of_teeth():
         ({"n_records": 0}, r"--records 0"),
         ({"duration": -1.0}, r"--duration"),
         ({"held_out": 1.0}, r"--held-out 1"),
+        ({"plain_healthy": 1.5}, r"--plain-healthy 1.5"),
         ({"seed": -1}, r"--seed -1"),
     ],
 )

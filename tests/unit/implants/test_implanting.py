@@ -55,6 +55,18 @@ def test_every_class_gets_the_level_that_was_drawn(pairs, healthy, residual, pat
             np.testing.assert_allclose(level_db(made, index), drawn, atol=0.05)
 
 
+def test_a_share_of_the_healthy_records_carries_nothing(pairs, healthy):
+    made = implanter(pairs, healthy, n_records=900, plain_healthy=0.5)
+    plain = {draw.name: [] for draw in made.plan.draws}
+    for draw in made.plan.draws:
+        plain[draw.name].append(np.isnan(draw.gain_db))
+    assert not any(plain[ONE_TOOTH] + plain[MANY_TEETH])
+    assert np.mean(plain[HEALTHY]) == pytest.approx(0.5, abs=0.1)
+    index = of_class(made, HEALTHY)[plain[HEALTHY].index(True)]
+    stretch = made.stretch(index).astype(np.float32)
+    np.testing.assert_array_equal(made.record(index), stretch)
+
+
 def test_gains_are_uniform_and_the_same_for_all_classes(pairs, healthy):
     made = implanter(pairs, healthy, n_records=3000, gain_db=(-4.0, 6.0))
     for name in CLASSES:
