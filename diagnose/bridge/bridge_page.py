@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -45,6 +46,8 @@ MEANINGS = {
     "seeds.",
     "By recording": "recordings drawn anew within each class. It holds for these specimens alone.",
     "By specimen": "specimens drawn anew within each class; 'too few' with fewer than four.",
+    "Intervals": "hold the spread of recordings or specimens, not that of seeds, and are not "
+    "corrected for the number of comparisons.",
     "Healthy against faulty": "chance that a faulty recording has a larger value than a healthy "
     "one; 0.50 is chance.",
     "Healthy recordings": "are judged on the blocks that were held out; judging a block that "
@@ -264,7 +267,12 @@ def _answer_rows(result: BridgeResult) -> list[dict[str, Any]]:
                         "specimen": judged.specimen[number],
                         "label": judged.labels[int(judged.label[number])],
                         "answer": answered,
-                        "faulty": f"{float(values[number]):.6g}",
+                        "faulty": _number_text(float(values[number])),
                     }
                 )
     return rows
+
+
+def _number_text(value: float) -> str:
+    """A number; empty where there is none."""
+    return "" if math.isnan(value) else f"{value:.6g}"

@@ -149,16 +149,21 @@ def _drawn(
     return float(low), float(high)
 
 
-def separation(judged: Judged, faulty: FloatArray) -> float:
+def separation(judged: Judged, faulty: FloatArray) -> float | None:
     """Area under the curve of healthy against faulty recordings, mean over seeds.
 
-    Chance that a faulty recording has a larger value than a healthy one; ties count half.
+    Chance that a faulty recording has a larger value than a healthy one; ties count half. NaN is
+    left out; None where no pair is left.
     """
     sound = judged.label == 0
     areas = []
     for row in np.asarray(faulty, dtype=float):
         difference = row[~sound][:, None] - row[sound][None, :]
-        areas.append(np.mean((difference > 0) + 0.5 * (difference == 0)))
+        known = difference[np.isfinite(difference)]
+        if known.size:
+            areas.append(np.mean((known > 0) + 0.5 * (known == 0)))
+    if not areas:
+        return None
     return float(np.mean(areas))
 
 

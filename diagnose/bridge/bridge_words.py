@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from diagnose.bridge.bridge_run import NOVELTY, OURS, BridgeResult
 from diagnose.bridge.bridge_scores import (
     ONE_SPECIMEN,
@@ -138,12 +140,20 @@ def _detection_lines(result: BridgeResult) -> list[str]:
     ours = separation(result.judged, result.answers[OURS].faulty)
     novelty = separation(result.judged, result.answers[NOVELTY].faulty)
     line = (
-        f"Healthy against faulty: the distance from healthy recordings separates {novelty:.2f} of "
-        f"pairs without any simulation, implants {ours:.2f}."
+        "Healthy against faulty: the distance from healthy recordings separates "
+        f"{area_text(novelty)} of pairs without any simulation, implants {area_text(ours)}."
     )
-    if novelty >= ours:
+    if novelty is not None and ours is not None and novelty >= ours:
         line += " Detection needs no simulation here."
-    return [line, *_alarm_lines(result)]
+    lines = [line, *_alarm_lines(result)]
+    if NOVELTY in result.why_not:
+        lines.append(f"Novelty: {result.why_not[NOVELTY]}.")
+    return lines
+
+
+def area_text(area: float | None) -> str:
+    """A share of pairs; a question mark where there is none."""
+    return "?" if area is None else f"{area:.2f}"
 
 
 def _alarm_lines(result: BridgeResult) -> list[str]:
@@ -151,10 +161,14 @@ def _alarm_lines(result: BridgeResult) -> list[str]:
     alarm = result.answers[NOVELTY].alarm
     if alarm is None:
         return []
-    sound = result.judged.label == 0
+    known = np.isfinite(result.answers[NOVELTY].faulty[0])
+    sound, faulty = (
+        known & (result.judged.label == 0),
+        known & (result.judged.label > 0),
+    )
     return [
         f"Novelty calls changed: {alarm[sound].sum()} of {sound.sum()} healthy and "
-        f"{alarm[~sound].sum()} of {(~sound).sum()} faulty recordings."
+        f"{alarm[faulty].sum()} of {faulty.sum()} faulty recordings."
     ]
 
 
@@ -176,7 +190,7 @@ def ranked_rows(result: BridgeResult) -> list[tuple[str, str, str, str, str]]:
     """A row a method: name, balanced accuracy, both intervals, healthy against faulty."""
     rows = []
     for method, answers in result.answers.items():
-        area = f"{separation(result.judged, answers.faulty):.2f}"
+        area = area_text(separation(result.judged, answers.faulty))
         if answers.predicted is None:
             rows.append((method, "names no class", "", "", area))
             continue

@@ -20,7 +20,7 @@ from gensig.errors import ConfigError
 def distance_answers(
     machine: BridgeMachine, healthy: Sequence[Stretch], judged: Sequence[Stretch]
 ) -> tuple[Answers | None, str]:
-    """Distance of each recording, or the reason why there is none.
+    """Distance of each recording, NaN for one that cannot be followed.
 
     Parameters
     ----------
@@ -29,36 +29,50 @@ def distance_answers(
 
     Returns
     -------
-    answers : None where a recording cannot be followed
-    reason : empty where there are answers
+    answers : None where nothing can be learnt or judged
+    reason : of what is left out, empty where nothing is
     """
     stages = GearStages(pairs=machine.train.stages)
+    reasons: list[str] = []
+    followed = [_followed(one, stages, reasons) for one in healthy]
+    asked = [_followed(one, stages, reasons) for one in judged]
+    learnt = [one for one in followed if one is not None]
+    known_asked = [one for one in asked if one is not None]
+    if not learnt or not known_asked:
+        return None, reasons[0]
+    shortest = min(known_asked, key=lambda one: one.n_turns)
     try:
-        followed = [_followed(one, stages) for one in healthy]
-        asked = [_followed(one, stages) for one in judged]
-        shortest = min(asked, key=lambda one: one.n_turns)
-        known = HealthyMachine.fit_followed(followed, stages, shortest=shortest)
+        known = HealthyMachine.fit_followed(learnt, stages, shortest=shortest)
         findings = [
-            _finding(known, one, stretch, healthy)
+            one and _finding(known, one, stretch, healthy)
             for one, stretch in zip(asked, judged, strict=True)
         ]
     except ConfigError as error:
         return None, str(error)
     answers = Answers(
         predicted=None,
-        faulty=np.array([[one.score for one in findings]]),
-        alarm=np.array([one.is_changed for one in findings]),
+        faulty=np.array([[np.nan if one is None else one.score for one in findings]]),
+        alarm=np.array([one is not None and one.is_changed for one in findings]),
     )
-    return answers, ""
+    if not reasons:
+        return answers, ""
+    return answers, f"{len(reasons)} stretch(es) are left out of it: {reasons[0]}"
 
 
-def _followed(stretch: Stretch, stages: GearStages) -> FollowedRecording:
-    return follow_shafts(
-        stretch.signal,
-        stages,
-        60.0 * stretch.sample.shaft_frequency,
-        name=stretch.sample.source.name,
-    )
+def _followed(
+    stretch: Stretch, stages: GearStages, reasons: list[str]
+) -> FollowedRecording | None:
+    """The stretch over the angle of its shafts; None, and a reason more, where none is found."""
+    try:
+        return follow_shafts(
+            stretch.signal,
+            stages,
+            60.0 * stretch.sample.shaft_frequency,
+            name=stretch.sample.source.name,
+        )
+    except ConfigError as error:
+        reasons.append(str(error))
+        return None
 
 
 def _finding(

@@ -121,3 +121,10 @@ def test_a_difference_on_the_same_recordings_is_paired() -> None:
 def test_the_area_is_the_share_of_pairs_in_order(values, area) -> None:
     of = judged(1, 2)
     assert separation(of, np.array([values], dtype=float)) == area
+
+
+def test_what_was_not_judged_is_left_out_of_the_area() -> None:
+    of = judged(1, 2)
+    values = np.array([[0.0, np.nan, 1.0, 1.0, -1.0, np.nan]])
+    assert separation(of, values) == pytest.approx(2 / 3)
+    assert separation(of, np.full((1, 6), np.nan)) is None
