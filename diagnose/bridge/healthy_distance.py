@@ -44,7 +44,7 @@ def distance_answers(
     try:
         known = HealthyMachine.fit_followed(learnt, stages, shortest=shortest)
         findings = [
-            one and _finding(known, one, stretch, healthy)
+            None if one is None else _finding(known, one, stretch, healthy)
             for one, stretch in zip(asked, judged, strict=True)
         ]
     except ConfigError as error:
