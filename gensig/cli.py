@@ -19,6 +19,7 @@ OF_DIAGNOSE = (
     "train",
     "evaluate",
     "predict",
+    "detect",
     "adapt",
     "bridge",
     "detectability",

@@ -22,8 +22,7 @@ EXAMPLE = """\
 examples:
   diagnose detect today.csv --healthy a.csv b.csv --teeth 23 46 --speed-rpm 1500
   diagnose detect today.csv --healthy a.csv --teeth 32 80 48 64 --speed-rpm 1800
-  diagnose detect x.npy y.npy --healthy a.npy b.npy --mounting c.npy d.npy --sampling-rate 5000 \\
-      --teeth 32 80 48 64 --speed-rpm 1800 --json"""
+  diagnose detect x.csv y.csv --healthy a.csv --mounting c.csv d.csv --teeth 23 46 --tacho pulses"""
 CHANGED = 3
 EXITS = {0: "healthy", CHANGED: "at least one recording is changed"}
 

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.detection.block_features import Feature, Layout
-from diagnose.detection.calibration import Threshold, threshold_of
 from diagnose.detection.healthy_spread import (
     HealthySpread,
     group_distance,
     healthy_spread,
 )
+from diagnose.detection.score_threshold import Threshold, threshold_of
 from diagnose.detection.time_blocks import BlockedRecording
 from diagnose.detection.tooth_changes import aligned, tooth_features, tooth_values
 

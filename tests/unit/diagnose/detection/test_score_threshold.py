@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnose.detection.calibration import PRIOR_DEVIATION, PRIOR_MEAN, threshold_of
+from diagnose.detection.score_threshold import PRIOR_DEVIATION, PRIOR_MEAN, threshold_of
 
 
 @pytest.mark.parametrize("n_healthy", [1, 3, 8, 19, 40])
