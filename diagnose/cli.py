@@ -21,8 +21,10 @@ VERBS = {
     "train": "train, judge and report",
     "evaluate": "judge a trained network",
     "predict": "try a trained network on a recording",
+    "detect": "compare a recording with healthy ones of the same gearbox",
     "export": "write a trained network as ONNX",
     "adapt": "move a trained network to a machine by its healthy recordings",
+    "bridge": "what a simulation is worth on a measured machine, with comparators",
     "detectability": "which test shows a fault: maps over speed, torque, channel and bandwidth",
     "score": "score predictions of your own, beside a frozen benchmark",
 }
@@ -38,6 +40,7 @@ OF_GENSIG = (
     "reproduce",
 )
 PROGRAM = "diagnose"
+FLAGS = "predict: unlike the training data; detect: changed"
 # module -> package of the extra, which an installation of gensig alone does not have
 EXTRA = {
     "torch": "torch",
@@ -50,7 +53,7 @@ INSTALL = "pip install 'gensig[diagnose]'"
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
-    Exit status 0, 2 for a mistake, 3 for the flag of predict, 130 when interrupted.
+    Exit status 0, 2 for a mistake, 3 for the flags of predict and detect, 130 when interrupted.
     """
     from gensig.terminal.completion import answer, is_asked
 
@@ -118,7 +121,7 @@ def _help() -> str:
     verbs = "\n".join(
         f"  {name:<{width}}  {summary}" for name, summary in VERBS.items()
     )
-    statuses = exit_text({3: "predict: the recording is unlike the training data"})
+    statuses = exit_text({3: FLAGS})
     return (
         "usage: diagnose COMMAND [ARGUMENTS]\n\n"
         "Train and judge fault classifiers on gensig data sets.\n\n"

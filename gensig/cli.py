@@ -15,7 +15,16 @@ from gensig.terminal.program import HELP_FLAGS, Parser, exit_text, guarded, refu
 from gensig.version import __version__
 
 PROGRAM = "gensig"
-OF_DIAGNOSE = ("train", "evaluate", "predict", "adapt", "detectability", "score")
+OF_DIAGNOSE = (
+    "train",
+    "evaluate",
+    "predict",
+    "detect",
+    "adapt",
+    "bridge",
+    "detectability",
+    "score",
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

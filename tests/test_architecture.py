@@ -58,7 +58,8 @@ def test_import_is_light(statement: str, absent: tuple[str, ...]) -> None:
 # Allow-list: the folders of its own package that a folder or a module of the top level imports.
 GENSIG = {
     "cli": "commands compilation terminal version",
-    "commands": "dataset driveline dynamics errors execution faults geometry implants life mesh "
+    "commands": "dataset driveline dynamics errors execution faults geometry implants life "
+    "measured mesh "
     "operation options papers plan production record report signals systems terminal text "
     "twin units",
     "dataset": "errors signals version",
@@ -73,6 +74,7 @@ GENSIG = {
     "implants": "dataset errors signals version",
     "life": "errors faults geometry material mesh options units",
     "material": "errors units",
+    "measured": "errors options signals text",
     "mesh": "compilation errors geometry material options units",
     "operation": "errors options text units",
     "options": "errors text units",
@@ -103,8 +105,11 @@ GENSIG = {
 }
 DIAGNOSE = {
     "baselines": "data networks scoring",
-    "commands": "data detectability progress recordings report settings studies training workers",
+    "bridge": "data detection report scoring settings studies training",
+    "commands": "bridge data detectability detection progress recordings report settings "
+    "studies training workers",
     "detectability": "workers",
+    "detection": "data recordings",
     "networks": "data",
     "recordings": "baselines data networks report scoring studies training",
     "report": "baselines data scoring studies training",
@@ -114,7 +119,17 @@ DIAGNOSE = {
     "training": "data networks scoring settings",
 }
 # What diagnose imports of gensig: the reading side of data sets, signals and words; no physics.
-OF_GENSIG = {"dataset", "errors", "options", "signals", "terminal", "text", "version"}
+OF_GENSIG = {
+    "dataset",
+    "errors",
+    "implants",
+    "measured",
+    "options",
+    "signals",
+    "terminal",
+    "text",
+    "version",
+}
 # Names that modules of one package may share; verbs of commands/ are named as they are typed.
 SHARED_NAMES = {"__init__", "_kernels", "_layout", "base", "options", "registry"}
 

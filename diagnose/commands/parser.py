@@ -27,7 +27,7 @@ def add_recording_options(parser: ArgumentParser) -> None:
         "--channels",
         nargs="+",
         metavar="NAME",
-        help="for the model's channels, in their order",
+        help="of the file; a model takes them in its order",
     )
     parser.add_argument(
         "--unit",

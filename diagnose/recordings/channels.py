@@ -3,9 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
 from gensig.signals.recording import RecordingFile, without_unit
+
+
+def tacho_apart(
+    content: RecordingFile, tacho: str | None
+) -> tuple[RecordingFile, NDArray[np.float64] | None]:
+    """A file without the channel of its tachometer, and that channel; None where none is named.
+
+    Raises
+    ------
+    ConfigError    for a channel that is not there, or is the only one
+    """
+    if tacho is None:
+        return content, None
+    if tacho not in content.channels:
+        raise ConfigError(
+            f"{content.file}: no channel {tacho}; it has {', '.join(content.channels)}",
+        )
+    index = content.channels.index(tacho)
+    names = tuple(name for name in content.channels if name != tacho)
+    if not names:
+        raise ConfigError(f"{content.file}: there is no channel beside {tacho}")
+    others = np.delete(content.values, index, axis=0)
+    return replace(content, channels=names, values=others), content.values[index]
 
 
 def chosen_channels(

@@ -57,7 +57,7 @@ def mesh_comb(
     """
     x = np.asarray(signal, dtype=float)
     highest = min(PASS_SHARE * sampling_rate, MOST_HARMONICS * mesh_frequency)
-    frequency, decades = _line_decades(
+    frequency, decades = line_decades(
         x, sampling_rate, n_teeth / mesh_frequency, highest
     )
     step = FINE / (MOST_HARMONICS * TURNS_A_SEGMENT * n_teeth)
@@ -79,7 +79,7 @@ def mesh_comb(
     )
 
 
-def _line_decades(
+def line_decades(
     x: FloatArray, sampling_rate: float, slow_turn: float, highest: float
 ) -> tuple[FloatArray, FloatArray]:
     """Frequencies up to the highest, Hz, and decades of each line over a usual one.

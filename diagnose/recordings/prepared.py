@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from diagnose.data.inputs import NetworkInput, RecordedSignal, SoundSignal
 from diagnose.data.turns import Turns
 from diagnose.data.windows import WindowSet
-from diagnose.recordings.channels import chosen_channels
+from diagnose.recordings.channels import chosen_channels, tacho_apart
 from diagnose.recordings.followed import (
     SPEED_TOLERANCE,
     at_nearest_rate,
@@ -314,21 +314,7 @@ def _read(
         array=source.array,
         rate_option=RATE_OPTION,
     )
-    tacho = None
-    if source.tacho is not None:
-        if source.tacho not in content.channels:
-            raise ConfigError(
-                f"{content.file}: no channel {source.tacho}; it has {', '.join(content.channels)}",
-            )
-        index = content.channels.index(source.tacho)
-        tacho = content.values[index]
-        names = tuple(name for name in content.channels if name != source.tacho)
-        if not names:
-            raise ConfigError(
-                f"{content.file}: there is no channel beside {source.tacho}"
-            )
-        others = np.delete(content.values, index, axis=0)
-        content = replace(content, channels=names, values=others)
+    content, tacho = tacho_apart(content, source.tacho)
     chosen = source.channels or content.channels
     if not description.takes_each_channel:
         chosen = chosen_channels(content, description.channel_names, source.channels)

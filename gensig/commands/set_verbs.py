@@ -361,6 +361,25 @@ SET_VERBS = {
 }
 
 OTHER_VERBS = {
+    "measured": Verb(
+        summary="what a folder of measured recordings holds: classes, specimens, hashes, gaps",
+        examples=(
+            "gensig measured",
+            "gensig measured mcc5_thu downloads/mcc5_thu",
+            "gensig measured rig/measured.yaml --hashes",
+        ),
+        runs="gensig.commands.sets.measured:measured",
+        arguments=(
+            text(
+                "words",
+                "SET DIR",
+                "a known set and its folder, or a YAML; nothing lists the sets",
+                nargs="*",
+            ),
+            switch("--hashes", help="print the sha256 of each file in full"),
+            switch("--json", help="print as JSON"),
+        ),
+    ),
     "twin": Verb(
         summary="a configuration like a measured healthy machine",
         examples=(

@@ -31,6 +31,7 @@ GROUPS = {
     "machines": (
         "new",
         "twin",
+        "measured",
         "simulate",
         "run-up",
         "modes",

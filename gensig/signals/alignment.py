@@ -79,24 +79,35 @@ def changed_turns(turns: GearTurns, sound: Sequence[GearTurns]) -> GearTurns:
     samples_per_tooth = turns.mesh.shape[-1]
     rotated = [aligned_turns(other, turns) for other in sound]
     return GearTurns(
-        driving=_changed(
+        driving=changed_turn(
             turns.driving, [other.driving for other in rotated], samples_per_tooth
         ),
-        driven=_changed(
+        driven=changed_turn(
             turns.driven, [other.driven for other in rotated], samples_per_tooth
         ),
         mesh=turns.mesh,
     )
 
 
-def _changed(
-    turn: FloatArray, sound: Sequence[FloatArray], samples_per_tooth: int
+def changed_turn(
+    turn: FloatArray, sound: Sequence[FloatArray], samples_per_tooth: float
 ) -> FloatArray:
-    """Part of a turn (channel, sample) that other turns of the gear do not predict."""
+    """Part of a turn that sound turns of the same shaft do not predict.
+
+    Parameters
+    ----------
+    turn : (channel, sample)
+    sound : of one or more sound recordings, as long, rotated to the turn
+    samples_per_tooth : a mesh order is a turn's samples over these
+
+    Returns
+    -------
+    (channel, sample), by the method of `changed_turns`
+    """
     spectrum = np.fft.rfft(turn)
     known = np.fft.rfft(np.stack(sound, axis=1))  # (channel, recording, order)
-    n_teeth = turn.shape[-1] // samples_per_tooth
-    window = np.hanning(2 * round(BAND * n_teeth / 2) + 3)[1:-1]
+    mesh_order = round(turn.shape[-1] / samples_per_tooth)
+    window = np.hanning(2 * round(BAND * mesh_order / 2) + 3)[1:-1]
     cross = _smooth(known.conj() * spectrum[:, None], window)
     power = _smooth(known.conj()[:, :, None] * known[:, None], window)
     own = np.trace(power.mean(axis=-1).real, axis1=1, axis2=2) / len(sound)

@@ -1,0 +1,1 @@
+"""The bridge to a measured machine: a frozen protocol, with comparators beside every score."""

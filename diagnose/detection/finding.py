@@ -1,0 +1,105 @@
+"""Answer of the detection for a recording, as values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from gensig.signals.handbook_rule import HandbookAnswer
+
+Kind = Literal["healthy", "shaft", "mesh", "broadband", "impulses"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FeatureChange:
+    """Change of a feature against the healthy recordings.
+
+    Attributes
+    ----------
+    name : in words
+    change_db : dB
+    spreads : the same in healthy spreads
+    """
+
+    name: str
+    change_db: float
+    spreads: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GroupChange:
+    """Distance of the features that show one kind of change.
+
+    Attributes
+    ----------
+    group : "broadband", "mesh", "sidebands", "teeth" or "impulses"
+    where : in words: a stage, a shaft, or all
+    part : number of the stage or shaft, from 0
+    ratio : of the distance to its limit; above 1 it is changed
+    features : those that changed most, in spreads
+    """
+
+    group: str
+    where: str
+    part: int
+    ratio: float
+    features: tuple[FeatureChange, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToothPlace:
+    """Place on a shaft that changed most.
+
+    Attributes
+    ----------
+    shaft : name of it
+    share_of_turn : of the shaft, after the recording began
+    teeth : for each gear on the shaft its name and the tooth, counted from the one in mesh when
+        the recording began, which is 0
+    over_median_db : dB, its change over that of the median tooth
+    """
+
+    shaft: str
+    share_of_turn: float
+    teeth: tuple[tuple[str, int], ...]
+    over_median_db: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """Answer for a recording.
+
+    Attributes
+    ----------
+    name : of the recording
+    is_changed : True if the score is above 1
+    score : distance from the healthy recordings over its limit; larger is less healthy
+    kind : of the change: of a shaft's turn or sidebands, of a mesh's level, of bands, or impulses
+        of no shaft
+    is_level_alone : True for a change of levels and no shape, as a sensor mounted anew makes it
+    changes : of all groups, the most changed first
+    place : on the shaft that changed most; None where no shaft did
+    level_db : dB, RMS over healthy, of the channel in which it rose most
+    handbook : answer of the rule of thumb
+    blocks_beyond, n_blocks : time blocks whose score is above 1, and all
+    rank_probability : share of held-back healthy recordings, this one counted, that score as high
+    speed_rpm : r/min of the input shaft
+    speed_by : tacho, or the mesh that was followed
+    notes : limits of the answer, a sentence each
+    """
+
+    name: str
+    is_changed: bool
+    score: float
+    kind: Kind
+    is_level_alone: bool
+    changes: tuple[GroupChange, ...]
+    place: ToothPlace | None
+    level_db: float
+    handbook: HandbookAnswer
+    blocks_beyond: int
+    n_blocks: int
+    rank_probability: float
+    speed_rpm: float
+    speed_by: str
+    notes: tuple[str, ...]
