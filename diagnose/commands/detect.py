@@ -17,7 +17,7 @@ how much, and where. Nothing is trained and nothing simulated.
 
 The speed is followed by the mesh of any stage, or by --tacho. Every recording needs 4 turns of the
 slowest shaft, a single healthy one 8, at 5000 samples a second or more. A sensor mounted anew looks
-like a fault, unless --mounting shows what a mounting changes."""
+like a fault; recordings of other mountings, --mounting, make that rarer."""
 EXAMPLE = """\
 examples:
   diagnose detect today.csv --healthy a.csv b.csv --teeth 23 46 --speed-rpm 1500
