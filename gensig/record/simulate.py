@@ -17,6 +17,7 @@ from gensig.errors import SimulationError
 from gensig.operation.options import operating_signals
 from gensig.operation.setpoint import Operating
 from gensig.options.configuration import Configuration
+from gensig.record.fault_gain import needs_sound, with_fault_gain
 from gensig.record.inputs import (
     MISSING,
     InputReader,
@@ -70,19 +71,22 @@ def finished_records(config: Configuration, rows: Sequence[Row]) -> Iterator[Rec
     inputs = [reader.inputs(row) for row in rows]
     keys = _twin_keys(config, rows)
     twins = _missing_twins(inputs, keys)
-    sound: dict[int, RecordInputs] = {}
-    if reader.dataset.needs_sound_records:
-        faulty = (k for k, each in enumerate(inputs) if each.run.faults)
-        sound = {index: inputs[index].without_faults() for index in faulty}
+    stored = reader.dataset.needs_sound_records
+    sound = {
+        index: each.without_faults()
+        for index, each in enumerate(inputs)
+        if needs_sound(each) or (stored and each.run.faults)
+    }
     motions = iter(simulate_motions([*inputs, *twins.values(), *sound.values()]))
     of_records = [next(motions) for _ in inputs]
     _keep_twins(keys, {key: (twin, next(motions)) for key, twin in twins.items()})
     of_sound = dict(zip(sound, motions, strict=True))
     for index, row in enumerate(rows):
+        of_sound_machine = of_sound.get(index, of_records[index])
         measured = _Measured(
             inputs=inputs[index],
-            motion=of_records[index],
-            sound=of_sound.get(index, of_records[index]),
+            motion=with_fault_gain(inputs[index], of_records[index], of_sound_machine),
+            sound=of_sound_machine,
             twin_power=_TWINS.power.get(keys[index]),
         )
         yield _record(config, row, measured)
