@@ -23,10 +23,10 @@ DRAWN = (
 OF_UNIT = DRAWN[:3]
 SMALL = (
     "experiment=bridge",
-    "plan.n_units=6",
-    "plan.n_records=12",
+    "plan.n_units=5",
+    "plan.n_records=10",
     "plan.classes=[healthy,missing_tooth]",
-    "operating.duration_s=0.3",
+    "operating.duration_s=0.2",
     # a short memory of the path, so that little is simulated before a record
     "sensing.path.natural_frequency_hz=[2000,12000]",
     "sensing.path.damping_ratio=[0.04,0.08]",

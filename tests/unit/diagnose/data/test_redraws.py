@@ -8,10 +8,12 @@ from fake_dataset import N_TEETH, FakeDataset
 from numpy.testing import assert_allclose, assert_array_equal
 from small_studies import study_of
 
+from diagnose.data.inputs import RecordedSignal, SoundSignal
 from diagnose.data.redrawn_sets import SOURCE, TWIN, RedrawnTurns
 from diagnose.data.redraws import Redraws
+from diagnose.data.references import ReferenceKind, all_references
 from diagnose.data.turns import Turns
-from diagnose.data.windows import all_segments, subset_segments
+from diagnose.data.windows import all_segments, read_signal, subset_segments
 from gensig.errors import ConfigError
 from gensig.options.configuration import Section
 from gensig.signals.separation import GearTurns
@@ -177,6 +179,31 @@ def test_a_training_has_the_redraws_behind_its_records_and_nothing_else_has(data
     for one, other in zip(trained.signals, again.signals, strict=True):
         assert_array_equal(one, other)
         assert np.isfinite(one).all()
+
+
+def test_a_recording_is_prepared_as_a_record_with_its_sound_records_is(dataset):
+    task, inputs = inputs_of(
+        dataset, "model.reference=every_condition", "model.whitened=machine"
+    )
+    record, speed = 5, dataset.column("speed_rpm")
+    sound = all_references(task, ReferenceKind.EVERY_CONDITION)[record]
+    assert len(sound) == 1
+    signals = {k: read_signal(task, k, 0, dataset.n_samples) for k in (record, *sound)}
+    recording = RecordedSignal(
+        signal=signals[record],
+        sampling_rate=dataset.sampling_rate,
+        speed_rpm=float(speed[record]),
+        file="a.npz",
+        window_samples=100,
+        stride_samples=100,
+        normalise="rms",
+        n_teeth=TEETH,
+        healthy=tuple(
+            SoundSignal(signal=signals[k], speed_rpm=float(speed[k])) for k in sound
+        ),
+    )
+    (own,) = inputs.of_recording(recording).signals
+    assert_array_equal(own, inputs.load(task, all_segments(task)).signals[record])
 
 
 def test_a_set_without_its_records_at_the_bearings_is_refused_with_what_to_do():
