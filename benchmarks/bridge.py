@@ -51,15 +51,14 @@ COMPARED = (
     "oracle=false",
 )
 ALONE, NEW = "by_unit", "new_machine"
+QUIET = ("model.whitened=machine",)
+REDRAWN = (*QUIET, "model.redraws=8")
 WITH_HEALTHY = {
     "two healthy": (worlds.SOURCE, ALONE, ()),
-    "without ringing": (worlds.SOURCE, ALONE, ("model.whitened=machine",)),
-    "randomised": (worlds.BRIDGE, NEW, ("model.whitened=machine",)),
-    "re-drawn": (
-        worlds.BRIDGE,
-        NEW,
-        ("model.whitened=machine", "model.redraws=8"),
-    ),
+    "without ringing": (worlds.SOURCE, ALONE, QUIET),
+    "without ringing, re-drawn": (worlds.SOURCE, ALONE, REDRAWN),
+    "randomised": (worlds.BRIDGE, NEW, QUIET),
+    "randomised, re-drawn": (worlds.BRIDGE, NEW, REDRAWN),
 }
 TOLD = (
     "cpu_model",
@@ -120,7 +119,7 @@ def judge_with_healthy(
         place = "bridge" if words is worlds.BRIDGE else "source"
         data = folder / f"{place}{mark}"
         opened = worlds.open_world(data, words, classes)
-        target = folder / f"{name.replace(' ', '_')}{mark}"
+        target = folder / f"{name.replace(',', '').replace(' ', '_')}{mark}"
         models = trained(target, data, *COMPARED, *own, protocol=protocol)
         networks[name] = models, opened
     for text in further:
@@ -138,7 +137,11 @@ def judge_with_healthy(
                 key = f"{name}, threshold" if shifted else name
                 result[world_name][key] = row
                 recall = " ".join(f"{each:.2f}" for each in row["recall"].values())
-                print(f"  {key:<28}{_said(row)}  recall {recall}", flush=True)
+                print(f"  {key:<36}{_said(row)}  recall {recall}", flush=True)
+        target = folder / f"healthy_{world_name}{mark}"
+        trained(target, world.folder, *COMPARED, *QUIET)
+        result[world_name]["trained there"] = there = _own_score(target)
+        print(f"  {'trained there':<36}{_said(there)} on its own test units")
     return result
 
 
