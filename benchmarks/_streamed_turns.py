@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -19,7 +20,7 @@ from threadpoolctl import threadpool_limits
 import gensig
 from diagnose.data.packed_turns import HEADER, packed, turns_of
 from diagnose.data.targets import fault_positions, record_targets, tooth_entries
-from diagnose.data.turns import Turns
+from diagnose.data.turns import Steady, Turns
 from diagnose.data.windows import IntArray, WindowSet
 from gensig.production.streaming import RecordStream
 from gensig.signals.separation import GearTurns
@@ -118,7 +119,7 @@ def _block(numbers: IntArray, file: Path | None) -> Inputs:
     made, inputs = Inputs(), _source["inputs"]
     for number, array in _turns(numbers, file):
         turns = inputs.prepared(_unpacked(array, inputs.samples_per_tooth))
-        for of_channel, sound in inputs.inputs_of(turns, ()):
+        for of_channel, sound in inputs.inputs_of([Steady(turns, math.nan)], math.nan):
             made.signals.append(inputs.packed(of_channel, sound).astype(np.float16))
             made.levels.append(inputs.levels(of_channel))
             made.record.append(number)

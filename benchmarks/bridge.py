@@ -1,11 +1,14 @@
-"""``python -m benchmarks.bridge``: does adapting a network by healthy recordings help, and what
-does it break?
+"""``python -m benchmarks.bridge``: are faults told on machines of other worlds, and by what?
 
-Trains the default network in one simulated world, adapts it to others by their healthy records
-alone (`diagnose.networks.adaptation`) and judges it on units that took no part; beside it the
-naive variants, which match all classes of the training to healthy records, and a network
-trained in the other world with labels. Then the negative control: recordings of two states that
-differ in the mounting, read from the folder ``$GENSIG_MEASURED`` where it is set.
+By networks that compare with two healthy recordings of the machine: trained in one simulated
+world as it is, without the ringing of the housing, on a randomised set, and with its re-draws. All
+units of a world are judged, since nothing is adapted to them. Beside them a network on windows as
+trained and adapted by healthy records (`diagnose.networks.adaptation`), judged on units that took
+no part; the naive variants, which match all classes of the training to healthy records; and a
+network trained in the other world with labels. Then the negative control: recordings of two
+states that differ in the mounting, read from the folder ``$GENSIG_MEASURED`` where it is set.
+
+``--classes`` makes the worlds with other faults, ``--model`` judges further stored networks there.
 """
 
 from __future__ import annotations
@@ -22,19 +25,41 @@ from typing import Any
 
 import gensig
 from benchmarks import _bridge_control as control
+from benchmarks import _bridge_healthy as healthy
 from benchmarks import _bridge_worlds as worlds
 from benchmarks._measure import machine, print_machine
 from benchmarks._realism_recording import VARIABLE
 from diagnose.cli import main as diagnose_main
+from gensig.dataset.reader import Dataset
 from gensig.errors import ConfigError, GensigError
 
 TRAINING = (
     "model=cnn",
-    "protocols=[by_unit]",
     "baselines=false",
     "shuffle_control=false",
 )
 SEEDS = (0, 1, 2)
+# Networks that compare with all sound records of a machine: the set that each is trained on, the
+# protocol that holds machines back, and further words of diagnose train.
+COMPARED = (
+    "model=tooth",
+    "reference=none",
+    "model.reference=every_condition",
+    "baselines=false",
+    "shuffle_control=false",
+    "metadata_probe=false",
+    "oracle=false",
+)
+ALONE, NEW = "by_unit", "new_machine"
+QUIET = ("model.whitened=machine",)
+REDRAWN = (*QUIET, "model.redraws=8")
+WITH_HEALTHY = {
+    "two healthy": (worlds.SOURCE, ALONE, ()),
+    "without ringing": (worlds.SOURCE, ALONE, QUIET),
+    "without ringing, re-drawn": (worlds.SOURCE, ALONE, REDRAWN),
+    "randomised": (worlds.BRIDGE, NEW, QUIET),
+    "randomised, re-drawn": (worlds.BRIDGE, NEW, REDRAWN),
+}
 TOLD = (
     "cpu_model",
     "python",
@@ -55,10 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     place = nullcontext(options.data) if options.data else tempfile.TemporaryDirectory()
     try:
         with place as folder, _one_thread():
-            result = {
-                "worlds": judge_worlds(Path(folder)),
-                "control": judge_control(Path(folder)),
-            }
+            result = _judged(Path(folder), options)
     except (GensigError, OSError) as error:
         print(f"benchmarks.bridge: {error}", file=sys.stderr)
         return 1
@@ -68,6 +90,59 @@ def main(arguments: Sequence[str] | None = None) -> int:
         text = json.dumps({"machine": told, "seeds": SEEDS, **result}, indent=1)
         options.json.write_text(text + "\n", encoding="utf-8")
     return 0
+
+
+def _judged(folder: Path, options: argparse.Namespace) -> dict[str, Any]:
+    """All parts of the benchmark; with other classes the networks with healthy records alone."""
+    classes = options.classes.split(",") if options.classes else []
+    result = {"with_healthy": judge_with_healthy(folder, classes, options.model)}
+    if not classes and not options.model:
+        result["worlds"] = judge_worlds(folder)
+        result["control"] = judge_control(folder)
+    return result
+
+
+def judge_with_healthy(
+    folder: Path, classes: Sequence[str] = (), further: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Scores in each world of networks that compare with its healthy records.
+
+    Parameters
+    ----------
+    folder : of data sets and models
+    classes : of all sets, in place of theirs
+    further : networks to judge beside those of the benchmark, each as ``NAME=MODEL=DATA``
+    """
+    mark = "".join(f"_{name}" for name in classes)
+    networks: dict[str, tuple[list[Path], Dataset]] = {}
+    for name, (words, protocol, own) in WITH_HEALTHY.items():
+        place = "bridge" if words is worlds.BRIDGE else "source"
+        data = folder / f"{place}{mark}"
+        opened = worlds.open_world(data, words, classes)
+        target = folder / f"{name.replace(',', '').replace(' ', '_')}{mark}"
+        models = trained(target, data, *COMPARED, *own, protocol=protocol)
+        networks[name] = models, opened
+    for text in further:
+        name, model, data = text.split("=", 2)
+        networks[name] = [Path(model)], gensig.open_dataset(data)
+    result: dict[str, Any] = {}
+    for world_name, words in worlds.WORLDS.items():
+        world = worlds.open_world(folder / f"{world_name}{mark}", words, classes)
+        print(f"\n{world_name}: compared with two healthy records of the machine")
+        result[world_name] = {}
+        for name, (models, opened) in networks.items():
+            answers = healthy.answers_with_healthy(models, opened, world)
+            for shifted in (False, True):
+                row = healthy.scores_of(answers, world.class_names, shifted=shifted)
+                key = f"{name}, threshold" if shifted else name
+                result[world_name][key] = row
+                recall = " ".join(f"{each:.2f}" for each in row["recall"].values())
+                print(f"  {key:<36}{_said(row)}  recall {recall}", flush=True)
+        target = folder / f"healthy_{world_name}{mark}"
+        trained(target, world.folder, *COMPARED, *QUIET)
+        result[world_name]["trained there"] = there = _own_score(target)
+        print(f"  {'trained there':<36}{_said(there)} on its own test units")
+    return result
 
 
 def judge_worlds(folder: Path) -> dict[str, Any]:
@@ -158,16 +233,17 @@ def _print_control(row: Mapping[str, Any]) -> None:
     )
 
 
-def trained(folder: Path, data: Path, *words: str) -> list[Path]:
+def trained(
+    folder: Path, data: Path, *words: str, protocol: str = worlds.PROTOCOL
+) -> list[Path]:
     """Folders of the networks, one a seed, trained on a data set where they are not there yet."""
     if not (folder / "metrics.json").is_file():
         seeds = f"seeds=[{','.join(map(str, SEEDS))}]"
-        status = diagnose_main(
-            ["train", f"data={data}", f"out={folder}", *TRAINING, seeds, *words]
-        )
+        chosen = (*TRAINING, f"protocols=[{protocol}]", seeds, *words)
+        status = diagnose_main(["train", f"data={data}", f"out={folder}", *chosen])
         if status != 0:
             raise ConfigError(f"diagnose train ended with status {status}")
-    return [folder / "models" / f"{worlds.PROTOCOL}-seed{seed}" for seed in SEEDS]
+    return [folder / "models" / f"{protocol}-seed{seed}" for seed in SEEDS]
 
 
 def _own_score(folder: Path) -> dict[str, Any]:
@@ -211,6 +287,20 @@ def _parser() -> argparse.ArgumentParser:
         "--json",
         type=Path,
         help="also write all figures, with the machine, to this file",
+    )
+    parser.add_argument(
+        "--classes",
+        metavar="A,B",
+        help="make sets and worlds with these classes, healthy first, and judge the networks "
+        "that compare with healthy records",
+    )
+    parser.add_argument(
+        "--model",
+        action="append",
+        default=[],
+        metavar="NAME=MODEL=DATA",
+        help="also judge this stored network, which compares with healthy records, and the data "
+        "set that it was trained on; may be repeated",
     )
     return parser
 

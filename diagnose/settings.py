@@ -18,7 +18,13 @@ from gensig.text.nearest import hint
 
 DEVICES = ("auto", "cpu", "cuda")
 HEADS = ("severity", "gear")
-REFERENCES = ("auto", "none", "other_condition", "same_condition")
+REFERENCES = (
+    "auto",
+    "none",
+    "other_condition",
+    "same_condition",
+    "every_condition",
+)
 TASKS = ("classes", "remaining_life")
 BOTH = (
     "both"  # value of normalise: one training without the level, a second one with it

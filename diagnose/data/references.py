@@ -23,6 +23,7 @@ class ReferenceKind(Enum):
 
     OTHER_CONDITION = "sound records at two conditions (plan.n_reference=1)"
     SAME_CONDITION = "a second sound record at each condition (plan.n_repeats=2)"
+    EVERY_CONDITION = "sound records at further conditions (plan.n_reference=2)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +67,7 @@ def references(task: Task, kind: ReferenceKind) -> IntArray:
     choose = {
         ReferenceKind.OTHER_CONDITION: _at_another_condition,
         ReferenceKind.SAME_CONDITION: _at_the_same_condition,
+        ReferenceKind.EVERY_CONDITION: _at_another_condition,
     }[kind]
     chosen = np.full(records.unit.size, NONE)
     for unit in np.unique(records.unit[records.example]):
@@ -77,6 +79,33 @@ def references(task: Task, kind: ReferenceKind) -> IntArray:
     if (chosen == NONE).all():
         raise ConfigError(f"no machine has {kind.value}: make the data set so")
     return chosen
+
+
+def all_references(task: Task, kind: ReferenceKind) -> tuple[tuple[int, ...], ...]:
+    """Sound records of the same unit for each record; none for one without a reference.
+
+    For EVERY_CONDITION all sound records at other conditions than the record's, the nearest in
+    set speed first; else that of `references` alone.
+
+    Raises
+    ------
+    ConfigError    as `references`
+    """
+    first = references(task, kind)
+    if kind is not ReferenceKind.EVERY_CONDITION:
+        return tuple(() if other == NONE else (other,) for other in first.tolist())
+    records = _records(task)
+    chosen: list[tuple[int, ...]] = []
+    for record, nearest in enumerate(first.tolist()):
+        others: list[int] = []
+        if nearest != NONE:
+            same_unit = records.unit == records.unit[record]
+            elsewhere = records.condition != records.condition[record]
+            found = np.flatnonzero(records.sound & same_unit & elsewhere)
+            away = np.abs(records.speed[found] - records.speed[record])
+            others = found[np.argsort(away, kind="stable")].tolist()
+        chosen.append(tuple(others))
+    return tuple(chosen)
 
 
 def _records(task: Task) -> _Records:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Self, final
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.inputs import NetworkInput, RecordedSignal
 from diagnose.data.packed_turns import HEADER, n_points, packed, turns_of
-from diagnose.data.references import reference_kind, references
+from diagnose.data.redrawn_sets import RedrawnTurns
+from diagnose.data.references import all_references, reference_kind
 from diagnose.data.targets import GEARS, fault_positions, record_targets, tooth_entries
 from diagnose.data.teeth import common_teeth, missing_teeth, teeth_of_records
 from diagnose.data.turn_levels import turn_levels
@@ -26,8 +27,9 @@ from diagnose.data.windows import (
     read_signal,
 )
 from gensig.errors import ConfigError, DatasetError
-from gensig.options.configuration import Section
+from gensig.options.configuration import Section, whole_number
 from gensig.signals.alignment import changed_turns
+from gensig.signals.ringing import without_ringing
 from gensig.signals.separation import GearTurns, separate_gears
 from gensig.signals.unexplained_teeth import unexplained_teeth
 
@@ -37,7 +39,8 @@ if TYPE_CHECKING:
 # Keys of a network's configuration.
 N_TEETH, PER_TOOTH, HALVES = "n_teeth", "samples_per_tooth", "halves"
 REFERENCE, NO_REFERENCE, UNEXPLAINED = "reference", "none", "unexplained"
-EACH_CHANNEL, WHITENED = "each_channel", "whitened"
+EACH_CHANNEL, WHITENED, REDRAWS = "each_channel", "whitened", "redraws"
+MACHINE = "machine"  # value of `WHITENED`: by all recordings of a machine together
 LEAST_HARMONICS = 3  # of the mesh that a recording must hold; assumed
 EXAMPLE_TEETH = (11, 13)  # of an input that is tried on a network; any numbers serve
 
@@ -48,6 +51,13 @@ NO_HEALTHY = (
     "this model takes no healthy recording: leave --healthy out, "
     "or train one with reference=other_condition"
 )
+
+
+class Steady(NamedTuple):
+    """Turns of a recording of steady speed, and its mesh frequency in Hz."""
+
+    turns: GearTurns
+    mesh_frequency: float
 
 
 @final
@@ -69,8 +79,11 @@ class Turns(NetworkInput):
         turns stands behind all others, see `gensig.signals.alignment.changed_turns`; or ``"none"``
     each_channel : True if every channel is an input of its own, so that a network takes
         recordings of any number of channels
-    whitened : True if the resonances of the machine are taken from the turns, see
-        `diagnose.data.whitening`
+    whitened : True if the resonances of the machine are taken from each turn by itself, see
+        `diagnose.data.whitening`; ``"machine"`` if from all recordings of the machine together,
+        see `gensig.signals.ringing`
+    redraws : further examples of every training record, each of a machine drawn anew, see
+        `diagnose.data.redraws`
     """
 
     samples_per_tooth: int
@@ -79,7 +92,8 @@ class Turns(NetworkInput):
     unexplained: bool = False
     reference: str = NO_REFERENCE
     each_channel: bool = False
-    whitened: bool = False
+    whitened: bool | str = False
+    redraws: int = 0
 
     has_window_length: ClassVar[bool] = False
     why_not_exported: ClassVar[str | None] = (
@@ -124,7 +138,10 @@ class Turns(NetworkInput):
             unexplained=model_config.get(UNEXPLAINED, False),
             reference=model_config.get(REFERENCE, NO_REFERENCE),
             each_channel=model_config.get(EACH_CHANNEL, False),
-            whitened=model_config.get(WHITENED, False),
+            whitened=_checked_whitening(model_config.get(WHITENED, False)),
+            redraws=whole_number(
+                f"model.{REDRAWS}", model_config.get(REDRAWS, 0), at_least=0
+            ),
         )
 
     @property
@@ -188,8 +205,13 @@ class Turns(NetworkInput):
                         ) from None
                     continue  # half a stretch may be too short
                 passages = (start + first) * passages_per_sample
-                for turns, sound in self.inputs_of(of_part, sound_turns(record)):
+                compared = [Steady(of_part, speed / 60 * n_teeth[0])]
+                for turns, sound in self.inputs_of(
+                    [*compared, *sound_turns(record)], rate
+                ):
                     gathered.add(self, turns, sound, record, passages)
+        if training and self.redraws:
+            self._add_redraws(task, segments, gathered)
         record_of, passage = np.array(gathered.record), np.array(gathered.passages)
         targets = record_targets(task.dataset, record_of)
         targets["position"] = fault_positions(
@@ -231,15 +253,19 @@ class Turns(NetworkInput):
                 f"{2 * LEAST_HARMONICS * mesh:.5g} or more, or at a lower speed"
             )
         try:
-            whole = self.turns(recording.signal, rate, speed_rpm, n_teeth)
-            healthy = [
-                self.turns(other.signal, rate, other.speed_rpm, n_teeth)
-                for other in recording.healthy
+            compared = [
+                Steady(
+                    self.turns(signal, rate, speed, n_teeth), speed / 60 * n_teeth[0]
+                )
+                for signal, speed in (
+                    (recording.signal, speed_rpm),
+                    *((other.signal, other.speed_rpm) for other in recording.healthy),
+                )
             ]
         except ValueError as error:
             raise ConfigError(f"{file}: {error}") from None
         gathered = _Gathered()
-        for turns, sound in self.inputs_of(whole, healthy):
+        for turns, sound in self.inputs_of(compared, rate):
             gathered.add(self, turns, sound, 0, 0.0)
         nothing = np.zeros(len(gathered.record), dtype=np.int64)
         return gathered.windows(nothing, recording.normalise)
@@ -278,8 +304,8 @@ class Turns(NetworkInput):
         return self.prepared(turns)
 
     def prepared(self, turns: GearTurns) -> GearTurns:
-        """Turns as the network looks at them: whitened, if the input says so."""
-        if self.whitened:
+        """Turns as the network looks at them: whitened, if the input says so of each by itself."""
+        if self.whitened is True:
             return whitened_turns(turns)
         return turns
 
@@ -334,17 +360,27 @@ class Turns(NetworkInput):
         return turn.reshape(len(turn), -1, self.samples_per_tooth)
 
     def inputs_of(
-        self, turns: GearTurns, sound: Sequence[GearTurns]
+        self, compared: Sequence[Steady], sampling_rate: float
     ) -> list[tuple[GearTurns, list[GearTurns]]]:
-        """Turns and those of sound recordings, for every input of a recording."""
+        """Turns and those of sound recordings, for every input of a recording.
+
+        Parameters
+        ----------
+        compared : the recording, and the sound ones of its machine
+        sampling_rate : Hz
+        """
+        turns, *sound = [each.turns for each in compared]
+        if self.whitened == MACHINE:
+            frequencies = [each.mesh_frequency for each in compared]
+            turns, *sound = without_ringing([turns, *sound], frequencies, sampling_rate)
         if not self.each_channel:
-            return [(turns, list(sound))]
+            return [(turns, sound)]
         return [
             (_channel(turns, index), [_channel(other, index) for other in sound])
             for index in range(len(turns.mesh))
         ]
 
-    def _sound_turns(self, task: Task, read: Read) -> Callable[[int], list[GearTurns]]:
+    def _sound_turns(self, task: Task, read: Read) -> Callable[[int], list[Steady]]:
         """Function that returns the turns of the reference of a record; none without references.
 
         Raises
@@ -353,26 +389,43 @@ class Turns(NetworkInput):
         """
         if self.reference == NO_REFERENCE:
             return lambda record: []
-        chosen = references(task, reference_kind(self.reference))
+        chosen = all_references(task, reference_kind(self.reference))
         n_samples, rate = int(task.dataset.n_samples), task.dataset.sampling_rate
         speed_rpm, teeth = _speed_rpm(task), teeth_of_records(task.dataset)
 
         @functools.cache
-        def turns(other: int) -> GearTurns:
-            signal = read(task, other, 0, n_samples)
+        def turns(other: int) -> Steady:
+            signal, speed = read(task, other, 0, n_samples), float(speed_rpm[other])
             driving, driven = teeth[other].tolist()
-            return self.turns(signal, rate, float(speed_rpm[other]), (driving, driven))
+            return Steady(
+                self.turns(signal, rate, speed, (driving, driven)), speed / 60 * driving
+            )
 
-        def of_record(record: int) -> list[GearTurns]:
-            other = int(chosen[record])
-            if other < 0:
+        def of_record(record: int) -> list[Steady]:
+            if not chosen[record]:
                 raise ConfigError(
                     f"record {record} has no sound record of its machine to compare with: "
                     "make the data set with plan.n_reference=1, or leave reference=none"
                 )
-            return [turns(other)]
+            return [turns(other) for other in chosen[record]]
 
         return of_record
+
+    def _add_redraws(self, task: Task, segments: Segments, gathered: _Gathered) -> None:
+        """Take in the records of the segments as those of machines drawn anew."""
+        sound: Sequence[Sequence[int]] = ()
+        if self.reference != NO_REFERENCE:
+            sound = all_references(task, reference_kind(self.reference))
+        redrawn = RedrawnTurns(task, self.samples_per_tooth, self.redraws)
+        for record in segments.record.tolist():
+            others = sound[record] if sound else ()
+            for drawn in redrawn.of_record(record, others):
+                compared = [
+                    Steady(self.prepared(turns), frequency)
+                    for turns, frequency in drawn
+                ]
+                for turns, healthy in self.inputs_of(compared, redrawn.sampling_rate):
+                    gathered.add(self, turns, healthy, record, 0.0)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -411,6 +464,14 @@ class _Gathered:
             n_header=HEADER,
             levels=np.stack(self.levels),
         )
+
+
+def _checked_whitening(value: Any) -> bool | str:
+    if value not in (True, False, MACHINE):
+        raise ConfigError(
+            f"model.{WHITENED} must be true, false or {MACHINE}, not {value!r}"
+        )
+    return value if value == MACHINE else bool(value)
 
 
 def _channel(turns: GearTurns, index: int) -> GearTurns:

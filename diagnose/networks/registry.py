@@ -35,7 +35,7 @@ MODELS: dict[str, type[Network]] = {
 # Keys of a network's file that its class does not take: its name, its schedule, its input and
 # the network that is trained where it cannot be.
 OTHERWISE = "otherwise"
-INPUT_KEYS = ("halves", "each_channel", "whitened")  # of the input alone
+INPUT_KEYS = ("halves", "each_channel", "whitened", "redraws")  # of the input alone
 NOT_OF_NETWORK = ("name", "kind", "training", OTHERWISE, *INPUT_KEYS)
 
 

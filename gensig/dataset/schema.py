@@ -50,6 +50,13 @@ SIGNALS = (
             "result",
             "accelerations at the bearings, before path and sensor, by source_names (optional)",
         ),
+        (
+            "healthy_twin_source",
+            "float32",
+            "m/s^2",
+            "result",
+            "the same of the record without its faults (optional)",
+        ),
     )
     | columns_of_axes(
         "channel",

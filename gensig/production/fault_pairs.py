@@ -17,6 +17,7 @@ from gensig.options.configuration import Configuration, whole_number
 from gensig.plan.condition_courses import SEED_KEY, settle_courses
 from gensig.plan.make import make_plan
 from gensig.production.streaming import epoch_seed
+from gensig.record.fault_gain import with_fault_gain
 from gensig.record.inputs import (
     InputReader,
     RecordInputs,
@@ -117,6 +118,7 @@ class FaultPairs:
         power = np.full(shape[:2], np.nan)
         for unit, inputs in enumerate(faulty):
             without, with_fault = motions[unit :: self.n_units]
+            with_fault = with_fault_gain(inputs, with_fault, without)
             if isinstance(without, SimulationError) or isinstance(
                 with_fault, SimulationError
             ):

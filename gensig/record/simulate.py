@@ -17,6 +17,7 @@ from gensig.errors import SimulationError
 from gensig.operation.options import operating_signals
 from gensig.operation.setpoint import Operating
 from gensig.options.configuration import Configuration
+from gensig.record.fault_gain import needs_sound, with_fault_gain
 from gensig.record.inputs import (
     MISSING,
     InputReader,
@@ -33,6 +34,7 @@ from gensig.version import __version__
 
 Array = NDArray[np.float64]
 Signals = dict[str, NDArray[Any]]
+TWIN, TWIN_SOURCE = "healthy_twin", "healthy_twin_source"  # signals without the faults
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,19 +72,22 @@ def finished_records(config: Configuration, rows: Sequence[Row]) -> Iterator[Rec
     inputs = [reader.inputs(row) for row in rows]
     keys = _twin_keys(config, rows)
     twins = _missing_twins(inputs, keys)
-    sound: dict[int, RecordInputs] = {}
-    if reader.dataset.needs_sound_records:
-        faulty = (k for k, each in enumerate(inputs) if each.run.faults)
-        sound = {index: inputs[index].without_faults() for index in faulty}
+    stored = reader.dataset.needs_sound_records
+    sound = {
+        index: each.without_faults()
+        for index, each in enumerate(inputs)
+        if needs_sound(each) or (stored and each.run.faults)
+    }
     motions = iter(simulate_motions([*inputs, *twins.values(), *sound.values()]))
     of_records = [next(motions) for _ in inputs]
     _keep_twins(keys, {key: (twin, next(motions)) for key, twin in twins.items()})
     of_sound = dict(zip(sound, motions, strict=True))
     for index, row in enumerate(rows):
+        of_sound_machine = of_sound.get(index, of_records[index])
         measured = _Measured(
             inputs=inputs[index],
-            motion=of_records[index],
-            sound=of_sound.get(index, of_records[index]),
+            motion=with_fault_gain(inputs[index], of_records[index], of_sound_machine),
+            sound=of_sound_machine,
             twin_power=_TWINS.power.get(keys[index]),
         )
         yield _record(config, row, measured)
@@ -117,15 +122,25 @@ class _Measured:
         assert reference is not None
         return sensing.noise_power(reference, signal.shape[-1])
 
-    def healthy_twin(self) -> Array:
-        """Output of the sensors on the same record without its faults.
+    def healthy_twin(self) -> Signals:
+        """Signals of the same record without its faults, as far as they are stored.
 
-        Nothing in it depends on the fault.
+        They are the output of the sensors and, where the source is stored, the accelerations at
+        the bearings. Nothing in them depends on the fault.
         """
+        dataset = self.inputs.dataset
+        if not dataset.store_healthy_twin:
+            return {}
         if isinstance(self.sound, SimulationError):
             raise self.sound
-        clean = self.inputs.instrument.measure(self.sound.acceleration)
-        return self.inputs.noisy_twin(clean, self.noise_power(clean))
+        source = self.sound.acceleration
+        clean = self.inputs.instrument.measure(source)
+        twin = self.inputs.noisy_twin(clean, self.noise_power(clean))
+        signals: Signals = {TWIN: twin.astype(np.float32)}
+        if dataset.store_source:
+            recorded = source[:, self.inputs.machine.sensing.n_lead :]
+            signals[TWIN_SOURCE] = recorded.astype(np.float32)
+        return signals
 
 
 def _record(config: Configuration, row: Row, measured: _Measured) -> Record:
@@ -162,7 +177,7 @@ def _finished(measured: _Measured) -> Record:
     sensing, dataset = inputs.machine.sensing, inputs.dataset
     clean = inputs.clean(motion.acceleration)
     noise_power = measured.noise_power(clean)
-    twin = measured.healthy_twin() if dataset.store_healthy_twin else None
+    twin = measured.healthy_twin()
     noisy, conversion = inputs.noisy(clean, noise_power)
     speed_rpm = from_si("speed_rpm", motion.mean_speed)
     values = {
@@ -178,9 +193,8 @@ def _finished(measured: _Measured) -> Record:
         residual = clean - inputs.clean(measured.sound.acceleration)
         values["detectability"] = detectability(residual, noise_power)
     source = motion.acceleration[:, sensing.n_lead :]
-    return Record(
-        signals=_samples(inputs, noisy, clean, noise_power, source, twin), values=values
-    )
+    signals = _samples(inputs, noisy, clean, noise_power, source)
+    return Record(signals=signals | twin, values=values)
 
 
 def _check_speed(operating: Operating, motion: CleanRecord) -> None:
@@ -206,17 +220,19 @@ def _failed(measured: _Measured, error: SimulationError) -> Record:
     silent = np.full((len(sensing.channel_names), n_samples), MISSING)
     source = np.full((len(sensing.channels), n_samples), MISSING)
     noise_power = np.full(len(silent), MISSING)
-    twin = silent if inputs.dataset.store_healthy_twin else None
+    twin: Signals = {}
+    if inputs.dataset.store_healthy_twin:
+        twin[TWIN] = silent.astype(np.float32)
+        if inputs.dataset.store_source:
+            twin[TWIN_SOURCE] = source.astype(np.float32)
     values = {
         "status": "failed",
         "status_reason": str(error),
         "speed_rpm": MISSING,
         "mesh_frequency_hz": MISSING,
     }
-    return Record(
-        signals=_samples(inputs, silent, silent, noise_power, source, twin),
-        values=values,
-    )
+    signals = _samples(inputs, silent, silent, noise_power, source)
+    return Record(signals=signals | twin, values=values)
 
 
 def _samples(
@@ -225,7 +241,6 @@ def _samples(
     clean: Array,
     noise_power: Array,
     source: Array,
-    twin: Array | None,
 ) -> Signals:
     """Signals of the sensors on the housing, in the types of a shard."""
     signals: Signals = {
@@ -235,8 +250,6 @@ def _samples(
     }
     if inputs.dataset.store_clean:
         signals["acceleration_clean"] = clean.astype(np.float32)
-    if twin is not None:
-        signals["healthy_twin"] = twin.astype(np.float32)
     if inputs.dataset.store_source:
         signals["acceleration_source"] = source.astype(np.float32)
     return signals
@@ -262,9 +275,12 @@ def signal_shapes(
     if dataset.store_clean:
         shapes["acceleration_clean"] = sensors
     if dataset.store_healthy_twin:
-        shapes["healthy_twin"] = sensors
+        shapes[TWIN] = sensors
     if dataset.store_source:
-        shapes["acceleration_source"] = (len(machine.sensing.channels), n_samples)
+        sources = (len(machine.sensing.channels), n_samples)
+        shapes["acceleration_source"] = sources
+        if dataset.store_healthy_twin:
+            shapes[TWIN_SOURCE] = sources
     if dataset.store_operating:
         shapes |= {"shaft_speed": samples, "torque_set": samples}
     shapes |= dict.fromkeys(dataset.shaft_signals, samples)

@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 
 SNR_REFERENCES = ("healthy_twin", "record")
 LONGEST_LEAD = 0.5  # s
+HIGHEST_GAIN = 1e3  # of what faults add, 60 dB; assumed
 SENSOR_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 CROSSED = {"x": "y", "y": "x"}
 EVERY_BEARING = "bearings"  # in place of the channels: x and y of every gear
@@ -58,7 +59,8 @@ class Sensing:
     the same condition without the fault (``healthy_twin``), so the floor does not reveal the
     class. None for ``sensor`` is an ideal one, None for ``noise`` is white noise over the whole
     band. ``nuisances`` shake the bearings
-    of every class.
+    of every class. ``fault_gain`` is the factor of what faults add to the accelerations, a law of
+    domain randomisation and no physics: 1 is the simulation, 0 the machine without its faults.
     """
 
     sampling_rate: float = unit("hz")
@@ -73,10 +75,16 @@ class Sensing:
     sensor: Accelerometer | None = None
     noise: Noise | None = None
     nuisances: tuple[Nuisance, ...] = ()
+    # Came after 0.14.0: configurations of earlier data sets lack it.
+    fault_gain: float = 1.0
 
     def __post_init__(self) -> None:
         check_limits(
-            self, "sensing.", sampling_rate=(1e3, 1e6), gain_scatter=(0.0, 0.5)
+            self,
+            "sensing.",
+            sampling_rate=(1e3, 1e6),
+            gain_scatter=(0.0, 0.5),
+            fault_gain=(0.0, HIGHEST_GAIN),
         )
         check_choice("sensing.snr_reference", self.snr_reference, SNR_REFERENCES)
         if not self.channels or len(set(self.channels)) != len(self.channels):

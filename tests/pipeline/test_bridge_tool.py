@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from benchmarks import _bridge_control as control
+from benchmarks import _bridge_healthy as healthy
 from benchmarks import _bridge_worlds as worlds
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "unit" / "diagnose"))
@@ -58,6 +59,36 @@ def test_scores_know_a_perfect_variant_from_chance():
     assert result["same"]["gain_interval"] == [0.0, 0.0]
     low, high = before["interval"]
     assert low < 0.25 < high
+
+
+def test_a_threshold_finds_its_share_of_the_healthy_records_it_was_fitted_on():
+    rng = np.random.default_rng(0)
+    label = np.repeat(np.arange(4), 40)
+    said = np.log(rng.dirichlet(np.ones(4), label.size))
+    shift = healthy.healthy_shift(said, label, 0)
+    moved = said + shift * (np.arange(4) == 0)
+    found = (moved.argmax(axis=1) == 0)[label == 0]
+    assert 0.95 <= found.mean() <= 0.975
+    answers = healthy.Answers(
+        label=label,
+        unit=np.tile(np.arange(16), 10),
+        log_probability=said[None],
+        shift=np.array([shift]),
+    )
+    plain = healthy.scores_of(answers, CLASSES)
+    row = healthy.scores_of(answers, CLASSES, shifted=True)
+    assert row["recall"]["healthy"] == found.mean()
+    assert plain["interval"][0] < 0.25 < plain["interval"][1]
+    assert row["n_units"] == 16
+
+
+def test_other_classes_take_the_place_of_those_of_a_world(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(worlds, "kept", lambda folder, words: asked.append(words))
+    worlds.open_world(tmp_path, worlds.SOURCE)
+    worlds.open_world(tmp_path, worlds.SOURCE, ["healthy", "surface_damage"])
+    assert asked[0] == list(worlds.SOURCE)
+    assert asked[1] == [*worlds.SOURCE, "plan.classes=[healthy,surface_damage]"]
 
 
 def test_every_variant_judges_units_that_no_adaptation_saw(model):

@@ -99,6 +99,17 @@ def test_drift_and_lost_samples_are_its_own() -> None:
             assert not np.array_equal(signals["acceleration"], signals["healthy_twin"])
 
 
+def test_with_the_source_stored_it_is_known_at_the_bearings() -> None:
+    """Free of noise, so that the record at the bearings less it is what the fault adds."""
+    source = "dataset.store_source=true"
+    faulty, sound = records(*REALISTIC, source), records(*REALISTIC, source, sham=True)
+    for record, without in zip(faulty, sound, strict=True):
+        twin = record.signals["healthy_twin_source"]
+        assert_array_equal(twin, without.signals["acceleration_source"])
+        is_sound = record.values["label_name"] == "healthy"
+        assert np.array_equal(twin, record.signals["acceleration_source"]) == is_sound
+
+
 def test_a_record_and_its_twin_are_the_same_alone_and_among_others(
     realistic: list,
 ) -> None:

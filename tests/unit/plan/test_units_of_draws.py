@@ -31,6 +31,7 @@ NUMBERS = {
     "drive_damping_ratio",
     "speed_tolerance",
     "gain_scatter",
+    "fault_gain",
     "tooth",
     "pitted_share",
     "diameter_scatter",
