@@ -29,8 +29,8 @@ from diagnose.data.windows import (
 from gensig.errors import ConfigError, DatasetError
 from gensig.options.configuration import Section, whole_number
 from gensig.signals.alignment import changed_turns
-from gensig.signals.ringing import without_ringing
 from gensig.signals.separation import GearTurns, separate_gears
+from gensig.signals.transfer.ringing import without_ringing
 from gensig.signals.unexplained_teeth import unexplained_teeth
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class Turns(NetworkInput):
         recordings of any number of channels
     whitened : True if the resonances of the machine are taken from each turn by itself, see
         `diagnose.data.whitening`; ``"machine"`` if from all recordings of the machine together,
-        see `gensig.signals.ringing`
+        see `gensig.signals.transfer.ringing`
     redraws : further examples of every training record, each of a machine drawn anew, see
         `diagnose.data.redraws`
     """

@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.signals.alignment import changed_turns
-from gensig.signals.ringing import without_ringing
 from gensig.signals.separation import GearTurns
+from gensig.signals.transfer.ringing import without_ringing
 
 RATE, TEETH, PER_TOOTH = 12800.0, (23, 40), 16
 FREQUENCIES = (410.0, 487.0, 560.0)  # of the mesh, Hz
