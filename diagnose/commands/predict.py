@@ -31,6 +31,7 @@ examples:
   diagnose predict --model report/models/new_machine-seed0 a.wav --channels left --speed-rpm 1500
   diagnose predict --model report/models/new_machine-seed0 runup.csv --tacho pulses
   diagnose predict --model report/models/new_machine-seed0 bench.csv --teeth 23 84 --speed-rpm 1500
+  diagnose predict --model runs/mine_report/models/new_machine-seed0 monday.csv --held-out
   diagnose predict --model runs/hours/models/by_unit-cnn-seed0 a.csv --speed-rpm 90 --torque-nm 9"""
 OUT_OF_DISTRIBUTION = 3
 EXITS = {
