@@ -14,6 +14,7 @@ predict.
 A difference between the healthy recordings and the healthy training data is taken for the effect
 of the machine's path, sensors and noise, and undone. Healthy recordings cannot show whether faults
 are moved alike: docs/howto/bridge.md says what was gained and lost where it could be measured.
+Recordings that carried implants in the training are taken: nothing is judged by them.
 Speeds and loads should be those of the training."""
 EXAMPLE = """\
 example:
@@ -87,6 +88,11 @@ def run(arguments: Namespace) -> int:
         print(
             f"unlike the training data: {before['n_windows_beyond']} of {n_windows} windows "
             f"before, {after['n_windows_beyond']} after"
+        )
+    if result["carried"]:
+        print(
+            f"{', '.join(result['carried'])}: carried implants in the training; what is said of "
+            "them above is memory"
         )
     print(
         "Healthy recordings cannot show whether faults are still found: docs/howto/bridge.md"

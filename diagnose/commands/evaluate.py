@@ -22,7 +22,7 @@ Evaluate a trained network on a data set.
   channels=A,B     optional: channels in place of those of the training, as many, in their order
 
 Without protocol: the test part of the network's split on the data set that it was trained on, all
-records elsewhere."""
+records elsewhere. Implants in stretches of recordings that carried in its training are refused."""
 EXAMPLE = """\
 examples:
   diagnose evaluate data=runs/other

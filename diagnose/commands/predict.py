@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from diagnose.commands.parser import add_model, add_recording_options
@@ -20,13 +21,17 @@ A model takes windows of its length, at its rate, of a speed that does not chang
 recording is resampled to that rate; one with less bandwidth is refused. Where the speed wanders,
 order tracking plays the recording at one speed, its mean or --to-speed: with --tacho by the pulses
 of the driving shaft, with --teeth and --speed-rpm by the mesh. A model of remaining life must know
-speed and torque too."""
+speed and torque too.
+
+A recording that carried implants in the training is refused; with --held-out only what was held
+out of it is scored."""
 EXAMPLE = """\
 examples:
   diagnose predict mine.wav --teeth 23 46 --speed-rpm 1800
   diagnose predict --model report/models/new_machine-seed0 a.wav --channels left --speed-rpm 1500
   diagnose predict --model report/models/new_machine-seed0 runup.csv --tacho pulses
   diagnose predict --model report/models/new_machine-seed0 bench.csv --teeth 23 84 --speed-rpm 1500
+  diagnose predict --model runs/mine_report/models/new_machine-seed0 monday.csv --held-out
   diagnose predict --model runs/hours/models/by_unit-cnn-seed0 a.csv --speed-rpm 90 --torque-nm 9"""
 OUT_OF_DISTRIBUTION = 3
 EXITS = {
@@ -46,6 +51,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_model(parser, required=False)
     _add_rotation(parser)
     add_recording_options(parser)
+    parser.add_argument(
+        "--held-out",
+        action="store_true",
+        help="of a recording that carried implants in the training, score only what was held out",
+    )
     _add_healthy(parser)
     parser.add_argument(
         "--torque-nm",
@@ -147,6 +157,10 @@ def run(arguments: Namespace) -> int:
         raise ConfigError(f"--plot {arguments.plot} must end in .png")
     folder = arguments.model or shipped_network()
     network = open_network(folder)
+    if arguments.held_out and network.description.carried is None:
+        raise ConfigError(
+            f"--held-out: {folder} knows of no implants (trained on none, or too old); leave it out"
+        )
     domain = load_domain(folder, network.description)
     if arguments.plot:
         _plot(arguments.plot, network, sources[0])
@@ -155,7 +169,7 @@ def run(arguments: Namespace) -> int:
         result = predict_recording(network, domain, source)
         results.append({"model": str(folder), **result})
         if not arguments.json:
-            print(network.line(result), flush=True)
+            print(network.line(result) + _held_out_text(arguments, result), flush=True)
     if arguments.json:
         import json
 
@@ -189,6 +203,7 @@ def _sources(arguments: Namespace) -> list[Source]:
             array=arguments.array,
             torque_nm=arguments.torque_nm,
             life_time_h=arguments.life_time_h,
+            held_out=arguments.held_out,
         )
         for recording in arguments.recording
     ]
@@ -203,6 +218,20 @@ def _sources(arguments: Namespace) -> list[Source]:
         )
         for source in described
     ]
+
+
+def _held_out_text(arguments: Namespace, result: Mapping[str, Any]) -> str:
+    """Samples that were scored, where those held out are asked for."""
+    if not arguments.held_out:
+        return ""
+    part = result["held_out"]
+    if part is None:
+        return "; held out: it carried nothing in the training, all of it was scored"
+    return (
+        f"; held out: only samples {part['start_sample']} to {part['stop_sample']} "
+        f"({part['start_s']:.4g} to {part['stop_s']:.4g} s) of {part['n_samples_recorded']} "
+        "were scored, the others carried implants in the training"
+    )
 
 
 def _plot(file: str, network: StoredNetwork, source: Source) -> None:

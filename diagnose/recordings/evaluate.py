@@ -11,6 +11,7 @@ from diagnose.data.at_rate import at_rate
 from diagnose.data.windows import Segments, Task, all_segments, subset_segments, task_of
 from diagnose.recordings.stored_network import Scores, StoredNetwork
 from diagnose.studies.result_files import write_metrics
+from diagnose.training.carried import refuse_seen
 from diagnose.training.store import ModelDescription, data_fingerprint, schema_version
 from gensig.dataset.schema import READABLE_VERSIONS
 from gensig.errors import ConfigError, DatasetError
@@ -62,13 +63,15 @@ def evaluate_network(
 
     Raises
     ------
-    DatasetError    if schema version, sampling rate, channels, classes or columns do not fit
+    DatasetError    if schema version, sampling rate, channels, classes or columns do not fit, and
+        for implants in stretches of recordings that carried in the training
     ConfigError    for a protocol or subset that does not exist, another number of channels, or a
         part with nothing to score
     """
     description = network.description
     task = _matching_task(network, dataset, channels)
     segments, part, shown = chosen_segments(task, description, protocol, subset)
+    refuse_seen(description.carried, dataset, segments)
     scores = network.scores(shown, segments, part)
     result = {
         "data": str(dataset.folder),

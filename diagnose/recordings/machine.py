@@ -42,7 +42,8 @@ def adapt_model(
     Returns
     -------
     plain dictionary: windows, mean probability of health and windows unlike the training, each
-    before and after
+    before and after, and the files that carried implants in the training: what is said of these
+    is memory
 
     Raises
     ------
@@ -65,9 +66,11 @@ def adapt_model(
     for source in sources:
         _check_speed(source, description)
     inputs = input_of(description.network)
-    parts = [
-        prepare_recording(description, inputs, source).windows for source in sources
+    prepared = [
+        prepare_recording(description, inputs, source, is_scored=False)
+        for source in sources
     ]
+    parts = [one.windows for one in prepared]
     windows = together(parts)
     adapted = adapt_network(model, statistics, windows, method)
     weights = {name: value.numpy() for name, value in adapted.state_dict().items()}
@@ -91,6 +94,11 @@ def adapt_model(
         "method": method,
         "n_recordings": len(parts),
         "n_windows": len(windows),
+        "carried": [
+            source.file
+            for source, one in zip(sources, prepared, strict=True)
+            if one.carried
+        ],
     }
     for when, network, region in (("before", model, domain), ("after", adapted, moved)):
         beyond = None

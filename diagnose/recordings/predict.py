@@ -45,6 +45,8 @@ def predict_recording(
     ------
     ConfigError    for a recording that cannot be read, is too short or too slowly sampled, or
         whose channels do not fit, and for what the network must know of it
+    DatasetError    for one that carried implants in the training, unless what was held out is asked
+        for
     """
     description = network.description
     network.check(source)
@@ -62,6 +64,9 @@ def predict_recording(
         n_beyond, threshold = int(beyond.sum()), domain.threshold
     if tracked is not None:
         tracking = tracking_facts(tracked, source)
+    held_out = None
+    if prepared.held_out is not None:
+        held_out = prepared.held_out.facts()
     reasons = reasons_unlike(description, source, tracked, beyond) + answer.reasons
     is_unlike = None
     if reasons or domain is not None:
@@ -81,6 +86,7 @@ def predict_recording(
         "model_sampling_rate_hz": rate,
         **answer.conditions,
         "order_tracking": tracking,
+        "held_out": held_out,
         "trained_n_teeth": n_teeth and list(n_teeth),
         **answer.training,
     }

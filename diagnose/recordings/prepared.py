@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -28,9 +29,11 @@ from diagnose.recordings.plausible import (
     check_turns,
 )
 from diagnose.recordings.source import Source
+from diagnose.training.carried import Stretch, digests_of, held_out_stretch
 from gensig.errors import ConfigError
 from gensig.signals.recording import (
     Recording,
+    RecordingFile,
     read_file,
     recording_of,
 )
@@ -55,6 +58,9 @@ class PreparedRecording:
     tracked : the recording over the shaft's angle; None without order tracking
     speed_rpm : r/min at which the inputs are; None where it is not known
     duration_s : duration of the signal of one input
+    held_out : samples that were held out of a recording that carried implants, `recording` is
+        these; None for a whole one
+    carried : True for a whole recording that carried and is not scored
     """
 
     windows: WindowSet
@@ -63,22 +69,44 @@ class PreparedRecording:
     tracked: Tracked | None
     speed_rpm: float | None
     duration_s: float
+    held_out: Stretch | None
+    carried: bool
 
 
 def prepare_recording(
-    description: ModelDescription, inputs: NetworkInput, source: Source
+    description: ModelDescription,
+    inputs: NetworkInput,
+    source: Source,
+    *,
+    is_scored: bool = True,
 ) -> PreparedRecording:
     """Inputs of a recording for a network, of the kind that it reads.
+
+    Parameters
+    ----------
+    is_scored : False for a recording that is only taken as healthy: it may have carried implants in
+        the training, as those of `Source.healthy` may
 
     Raises
     ------
     ConfigError    for a recording that cannot be read, is too short or too slowly sampled, or
         whose channels do not fit
+    DatasetError    for one that is scored and carried, unless what was held out is asked for
     """
-    played = _played(description, inputs, source, SPEED_OPTION)
+    read = _without_carried(
+        description, _read(description, source), source, is_scored=is_scored
+    )
+    played = _played(description, inputs, source, read, SPEED_OPTION)
     recording = played.recording
     sound = [
-        _played(description, inputs, other, HEALTHY_SPEED_OPTION, played.sampling_rate)
+        _played(
+            description,
+            inputs,
+            other,
+            _read(description, other),
+            HEALTHY_SPEED_OPTION,
+            played.sampling_rate,
+        )
         for other in source.healthy
     ]
     if isinstance(inputs, Turns):
@@ -109,7 +137,30 @@ def prepare_recording(
             window=description.window_samples / description.sampling_rate_hz,
             recording=float(n_recorded / recording.sampling_rate),
         ),
+        held_out=read.held_out,
+        carried=read.carried,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Read:
+    """A recording as read, at its own rate.
+
+    Attributes
+    ----------
+    content : of the file, without the tachometer
+    recording : with the network's channels in their order
+    channels : their names in the file
+    tacho : (sample,) pulses, or None
+    held_out, carried : as in `PreparedRecording`
+    """
+
+    content: RecordingFile
+    recording: Recording
+    channels: tuple[str, ...]
+    tacho: NDArray[Any] | None
+    held_out: Stretch | None = None
+    carried: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,6 +186,7 @@ def _played(
     description: ModelDescription,
     inputs: NetworkInput,
     source: Source,
+    read: _Read,
     speed_option: str,
     sampling_rate: float | None = None,
 ) -> _Played:
@@ -146,7 +198,7 @@ def _played(
     ------
     ConfigError    as `prepare_recording`
     """
-    recording, channels, tacho = _read(description, source)
+    recording, tacho = read.recording, read.tacho
     tracked = None
     if isinstance(inputs, Turns):
         teeth = _teeth(description, inputs, source)
@@ -172,7 +224,7 @@ def _played(
         signal=signal.astype(np.float32),
         sampling_rate=rate,
         recording=recording,
-        channels=channels,
+        channels=read.channels,
         tracked=tracked,
         speed_rpm=speed,
     )
@@ -303,11 +355,8 @@ def tracking_text(tracking: Mapping[str, Any] | None) -> str:
     )
 
 
-def _read(
-    description: ModelDescription,
-    source: Source,
-) -> tuple[Recording, tuple[str, ...], NDArray[Any] | None]:
-    """Recording with the network's channels in their order, their names in the file, the tacho."""
+def _read(description: ModelDescription, source: Source) -> _Read:
+    """Recording with the network's channels in their order, and its tachometer."""
     content = read_file(
         source.file,
         rate=source.sampling_rate,
@@ -324,4 +373,39 @@ def _read(
         channels=chosen,
         needs_level=description.normalise == "none",
     )
-    return recording, chosen, tacho
+    return _Read(content=content, recording=recording, channels=chosen, tacho=tacho)
+
+
+def _without_carried(
+    description: ModelDescription, read: _Read, source: Source, *, is_scored: bool
+) -> _Read:
+    """The recording, or what was held out of it if it carried implants and is scored.
+
+    Raises
+    ------
+    DatasetError    for one that carried, unless what was held out is asked for
+    """
+    carried = description.carried
+    if carried is None:
+        return read
+    forms = [read.recording]
+    with suppress(ConfigError):  # other columns of the file may be no accelerations
+        forms.append(recording_of(read.content, unit=source.unit, needs_level=False))
+    digests = digests_of(source.file, *forms)
+    if not is_scored:
+        own = carried.of_recording(digests)
+        return replace(read, carried=any(block.carries for block in own))
+    stretch = held_out_stretch(
+        carried,
+        digests,
+        read.recording,
+        file=source.file,
+        held_out=source.held_out,
+    )
+    if stretch is None:
+        return read
+    tacho = read.tacho
+    if tacho is not None:
+        tacho = tacho[stretch.start : stretch.stop]
+    recording = stretch.of(read.recording)
+    return replace(read, recording=recording, tacho=tacho, held_out=stretch)

@@ -28,6 +28,7 @@ class Source:
     healthy : recordings of the same machine when it was sound, described in the same way
     torque_nm : N m of the driving shaft, for remaining lives
     life_time_h : h since the machine was new, for remaining lives with the age
+    held_out : True to score only what was held out of a recording that carried implants
     """
 
     file: str
@@ -44,6 +45,7 @@ class Source:
     healthy: tuple[Source, ...] = ()
     torque_nm: float | None = None
     life_time_h: float | None = None
+    held_out: bool = False
 
     def __post_init__(self) -> None:
         if self.speed_rpm is not None and not 0.0 < self.speed_rpm < 1e6:

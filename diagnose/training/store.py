@@ -14,6 +14,7 @@ import numpy as np
 from diagnose.data.teeth import common_teeth, teeth_range
 from diagnose.data.windows import Task, subset_segments
 from diagnose.settings import TrainSettings
+from diagnose.training.carried import Carried, carried_from, carried_in
 from gensig.errors import DatasetError
 from gensig.options.configuration import Section
 
@@ -49,6 +50,8 @@ class ModelDescription:
     adaptation : see `diagnose.recordings.machine`; None as trained
     test_score : see `diagnose.studies.study.test_score`; None in older models
     remaining_life : see `diagnose.training.life_store`; None for a classifier
+    carried : blocks of recordings that carried implants; None for a network of any other data set,
+        and in older models
     """
 
     model_schema_version: int
@@ -74,6 +77,7 @@ class ModelDescription:
     adaptation: dict[str, Any] | None = None
     test_score: dict[str, Any] | None = None
     remaining_life: dict[str, Any] | None = None
+    carried: Carried | None = None
 
     @property
     def network(self) -> Section:
@@ -160,6 +164,7 @@ def model_description(
         out_of_distribution=facts,
         temperature=prediction.temperature,
         test_channel_names=None if tested == channels else tested,
+        carried=carried_in(task, prediction.protocol),
     )
 
 
@@ -172,7 +177,10 @@ def save_model(
     folder.mkdir(parents=True, exist_ok=True)
     arrays = {name: np.ascontiguousarray(value) for name, value in weights.items()}
     save_file(arrays, folder / WEIGHTS)
-    text = json.dumps(asdict(description), indent=2) + "\n"
+    content = asdict(description)
+    if description.carried is not None:
+        content["carried"] = description.carried.content()
+    text = json.dumps(content, indent=2) + "\n"
     (folder / DESCRIPTION).write_text(text, encoding="utf-8")
 
 
@@ -371,6 +379,7 @@ _OPTIONAL: dict[str, Callable[[Any], Any]] = {
     "adaptation": dict,
     "remaining_life": dict,
     "test_score": dict,
+    "carried": carried_from,
 }
 
 
