@@ -83,8 +83,8 @@ def test_all_records_of_a_world_are_judged_but_the_references(model):
     answers = healthy.answers_of([model], world(), other)
     assert answers.log_probability.shape == (1, (reference == 0).sum(), 4)
     assert np.isfinite(answers.log_probability).all()
-    names = [world().class_names[label] for label in answers.label]
-    assert names == list(np.asarray(other.column("label"))[reference == 0])
+    names = [CLASSES[label] for label in answers.label]
+    assert names == list(other.columns["label_name"][reference == 0])
     row = healthy.scores_of(answers, CLASSES)
     assert row["n_units"] == 12
     sure = np.log(np.where(np.arange(4) == answers.label[:, None], 0.97, 0.01))
