@@ -2,9 +2,8 @@
 mounted, not in the gear.
 
 The recordings are looked for in the folder ``$GENSIG_MEASURED`` and nowhere else. Networks are
-trained on one channel of simulated gears of its teeth and speed. They are adapted by one half
-of the healthy recordings and judge the other half of both states; then the halves change
-places. Every window is judged once, by networks that did not see it.
+trained on one channel of simulated gears of its teeth and speed, and judge all windows of both
+states.
 """
 
 from __future__ import annotations
@@ -19,16 +18,13 @@ from numpy.typing import NDArray
 
 from benchmarks._bridge_worlds import CROSSED
 from benchmarks._realism_recording import VARIABLE
-from diagnose.data.windows import Segments, WindowSet, plan_windows
-from diagnose.networks.adaptation import HEALTHY, METHODS, adapt_domain, adapt_network
+from diagnose.data.windows import HEALTHY, Segments, WindowSet, plan_windows
 from diagnose.networks.domain import distances
-from diagnose.recordings.machine import together
 from diagnose.training.classes import predict_windows
 from diagnose.training.store import (
     ModelDescription,
     load_domain,
     load_model,
-    load_statistics,
 )
 from gensig.cli import main as gensig_main
 from gensig.errors import ConfigError
@@ -63,7 +59,6 @@ TRAINING = (
 BLOCK = 2  # windows that are drawn together
 N_BOOTSTRAP = 5000
 CLASSES = ("healthy", "crack", "broken", "missing_tooth")
-BEFORE = "before"
 
 
 def find_control() -> Path | None:
@@ -144,7 +139,7 @@ def training_sets(file: Path, twin: Path) -> dict[str, tuple[list[str], Path | N
 
 
 def judge_control(file: Path, models: Sequence[Path]) -> list[dict[str, Any]]:
-    """One row for each channel, load and variant.
+    """One row for each channel and load.
 
     How much more of a fault the broken state is said to have.
     """
@@ -156,85 +151,42 @@ def judge_control(file: Path, models: Sequence[Path]) -> list[dict[str, Any]]:
         }
     n_channels = len(recorded[STATES[0], LOADS[0]])
     loaded = [
-        (*load_model(folder), load_domain(folder, load_model(folder)[1]), folder)
+        (*load_model(folder), load_domain(folder, load_model(folder)[1]))
         for folder in models
     ]
     rng = np.random.default_rng(20240607)
     rows = []
     for channel in range(n_channels):
-        for variant in (BEFORE, *METHODS):
-            result = [_judge(recorded, channel, variant, *one) for one in loaded]
-            for load in LOADS:
-                fault = {
-                    state: np.mean([one[state, load][0] for one in result], axis=0)
+        result = [_judge(recorded, channel, *one) for one in loaded]
+        for load in LOADS:
+            fault, beyond = (
+                {
+                    state: np.mean([one[state, load][which] for one in result], axis=0)
                     for state in STATES
                 }
-                beyond = {
-                    state: np.mean([one[state, load][1] for one in result], axis=0)
-                    for state in STATES
-                }
-                rows.append(
-                    {
-                        "channel": channel,
-                        "variant": variant,
-                        "load": load,
-                        **_row(fault, beyond, rng),
-                    }
-                )
+                for which in (0, 1)
+            )
+            rows.append({"channel": channel, "load": load, **_row(fault, beyond, rng)})
     return rows
 
 
 def _judge(
     recorded: dict[tuple[str, int], NDArray[Any]],
     channel: int,
-    variant: str,
     model: Any,
     description: ModelDescription,
     domain: Any,
-    folder: Path,
 ) -> dict[tuple[str, int], tuple[FloatArray, FloatArray]]:
     """(state, load) -> probability of a fault and whether unlike the training, (window,) each, in
     the order of time.
     """
-    statistics = load_statistics(folder)
-    assert statistics is not None
     healthy = description.class_names.index(HEALTHY)
-    halves = {
-        key: _halves(signal[channel : channel + 1], description)
-        for key, signal in recorded.items()
-    }
-    result: dict[tuple[str, int], list[tuple[FloatArray, FloatArray]]] = {
-        key: [] for key in recorded
-    }
-    for judged in (0, 1):
-        network, region = model, domain
-        if variant != BEFORE:
-            given = together([halves[STATES[0], load][1 - judged] for load in LOADS])
-            network = adapt_network(model, statistics, given, variant)
-            region = adapt_domain(domain, statistics, given)
-        for key, parts in halves.items():
-            said = 1.0 - np.exp(predict_windows(network, parts[judged])[:, healthy])
-            result[key].append(
-                (said, distances(region, parts[judged]) > region.threshold)
-            )
-    return {
-        key: (
-            np.concatenate([said for said, _ in parts]),
-            np.concatenate([beyond for _, beyond in parts]),
-        )
-        for key, parts in result.items()
-    }
-
-
-def _halves(
-    signal: NDArray[Any], description: ModelDescription
-) -> tuple[WindowSet, WindowSet]:
-    n_samples = signal.shape[-1]
-    first, second = (
-        _windows(part, description)
-        for part in (signal[:, : n_samples // 2], signal[:, n_samples // 2 :])
-    )
-    return first, second
+    result = {}
+    for key, signal in recorded.items():
+        windows = _windows(signal[channel : channel + 1], description)
+        said = 1.0 - np.exp(predict_windows(model, windows)[:, healthy])
+        result[key] = said, distances(domain, windows) > domain.threshold
+    return result
 
 
 def _windows(signal: NDArray[Any], description: ModelDescription) -> WindowSet:

@@ -1,4 +1,4 @@
-"""Networks that compare with healthy recordings of a machine, judged on a world as it is.
+"""Networks, most with healthy recordings of a machine beside, judged on a world as it is.
 
 No record of a world takes part in any choice. The threshold, what is added to the log-probability
 of healthy, is fitted on healthy records of machines that the training held back.
@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.data.turns import Turns
 from diagnose.data.windows import (
+    HEALTHY,
     IS_REFERENCE,
     Segments,
     Task,
@@ -23,7 +23,6 @@ from diagnose.data.windows import (
     subset_segments,
     task_of,
 )
-from diagnose.networks.adaptation import HEALTHY
 from diagnose.networks.registry import input_of
 from diagnose.scoring.metrics import (
     balanced_accuracy,
@@ -59,17 +58,15 @@ class Answers:
     shift: FloatArray
 
 
-def answers_with_healthy(
-    models: Sequence[Path], trained_on: Dataset, world: Dataset
-) -> Answers:
-    """Answers of networks for all records of a world, each compared with the sound ones of its
-    machine.
+def answers_of(models: Sequence[Path], trained_on: Dataset, world: Dataset) -> Answers:
+    """Answers of networks for all records of a world.
+
+    Those on turns compare each with the sound ones of its machine.
     """
     said, shifts = [], []
     for folder in models:
         network, description = load_model(folder)
         inputs = input_of(description.network)
-        assert isinstance(inputs, Turns)
         task = _task(description, trained_on)
         healthy = task.class_names.index(HEALTHY)
         held_back = [

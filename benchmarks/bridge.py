@@ -2,11 +2,10 @@
 
 By networks that compare with two healthy recordings of the machine: trained in one simulated
 world as it is, without the ringing of the housing, on a randomised set, and with its re-draws. All
-units of a world are judged, since nothing is adapted to them. Beside them a network on windows as
-trained and adapted by healthy records (`diagnose.networks.adaptation`), judged on units that took
-no part; the naive variants, which match all classes of the training to healthy records; and a
-network trained in the other world with labels. Then the negative control: recordings of two
-states that differ in the mounting, read from the folder ``$GENSIG_MEASURED`` where it is set.
+units of a world are judged, since none takes part. Beside them a network on windows without
+healthy recordings, and one trained in the other world with labels. Then the negative control:
+recordings of two states that differ in the mounting, read from the folder ``$GENSIG_MEASURED``
+where it is set.
 
 ``--classes`` makes the worlds with other faults, ``--model`` judges further stored networks there.
 """
@@ -53,6 +52,7 @@ COMPARED = (
 ALONE, NEW = "by_unit", "new_machine"
 QUIET = ("model.whitened=machine",)
 REDRAWN = (*QUIET, "model.redraws=8")
+PLAIN = "no healthy"  # on windows, with the words of TRAINING alone
 WITH_HEALTHY = {
     "two healthy": (worlds.SOURCE, ALONE, ()),
     "without ringing": (worlds.SOURCE, ALONE, QUIET),
@@ -93,11 +93,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _judged(folder: Path, options: argparse.Namespace) -> dict[str, Any]:
-    """All parts of the benchmark; with other classes the networks with healthy records alone."""
+    """All parts of the benchmark; with other classes those of the worlds alone."""
     classes = options.classes.split(",") if options.classes else []
     result = {"with_healthy": judge_with_healthy(folder, classes, options.model)}
     if not classes and not options.model:
-        result["worlds"] = judge_worlds(folder)
         result["control"] = judge_control(folder)
     return result
 
@@ -105,7 +104,7 @@ def _judged(folder: Path, options: argparse.Namespace) -> dict[str, Any]:
 def judge_with_healthy(
     folder: Path, classes: Sequence[str] = (), further: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Scores in each world of networks that compare with its healthy records.
+    """Scores in each world of networks that compare with its healthy records, and of one without.
 
     Parameters
     ----------
@@ -122,17 +121,20 @@ def judge_with_healthy(
         target = folder / f"{name.replace(',', '').replace(' ', '_')}{mark}"
         models = trained(target, data, *COMPARED, *own, protocol=protocol)
         networks[name] = models, opened
+    data = folder / f"source{mark}"
+    models = trained(folder / f"model{mark}", data)
+    networks[PLAIN] = models, worlds.open_world(data, worlds.SOURCE, classes)
     for text in further:
         name, model, data = text.split("=", 2)
         networks[name] = [Path(model)], gensig.open_dataset(data)
     result: dict[str, Any] = {}
     for world_name, words in worlds.WORLDS.items():
         world = worlds.open_world(folder / f"{world_name}{mark}", words, classes)
-        print(f"\n{world_name}: compared with two healthy records of the machine")
+        print(f"\n{world_name}: all units")
         result[world_name] = {}
         for name, (models, opened) in networks.items():
-            answers = healthy.answers_with_healthy(models, opened, world)
-            for shifted in (False, True):
+            answers = healthy.answers_of(models, opened, world)
+            for shifted in (False,) if name == PLAIN else (False, True):
                 row = healthy.scores_of(answers, world.class_names, shifted=shifted)
                 key = f"{name}, threshold" if shifted else name
                 result[world_name][key] = row
@@ -142,44 +144,6 @@ def judge_with_healthy(
         trained(target, world.folder, *COMPARED, *QUIET)
         result[world_name]["trained there"] = there = _own_score(target)
         print(f"  {'trained there':<36}{_said(there)} on its own test units")
-    return result
-
-
-def judge_worlds(folder: Path) -> dict[str, Any]:
-    """Scores in each world, of every variant."""
-    source = worlds.open_world(folder / "source", worlds.SOURCE)
-    models = trained(folder / "model", folder / "source")
-    result = {"source": _own_score(folder / "model")}
-    print(f"\nin its own world, unseen units: {_said(result['source'])}", flush=True)
-    for name, words in worlds.WORLDS.items():
-        world = worlds.open_world(folder / name, words)
-        judged = worlds.judge_world(source, world, models)
-        table = worlds.scores(judged, source.class_names)
-        trained(folder / f"model_{name}", folder / name)
-        there = _own_score(folder / f"model_{name}")
-        n_units = len(set(judged.unit.tolist()))
-        print(
-            f"\n{name}: {judged.label.size} records of {n_units} units, "
-            f"{judged.n_windows} healthy windows to adapt by"
-        )
-        for variant, row in table.items():
-            gain = (
-                f"{row['gain']:+.3f} [{row['gain_interval'][0]:+.3f}, "
-                f"{row['gain_interval'][1]:+.3f}]"
-            )
-            print(
-                f"  {variant:<24}{_said(row)}  gain {gain}  auroc {row['auroc']:.3f}  "
-                f"healthy found {row['recall'][worlds.HEALTHY]:.2f}"
-            )
-        print(
-            f"  {'trained there':<24}{_said(there)} on its own test units", flush=True
-        )
-        result[name] = {
-            "n_records": judged.label.size,
-            "n_units": n_units,
-            "variants": table,
-            "trained_there": there,
-        }
     return result
 
 
@@ -207,7 +171,7 @@ def judge_control(folder: Path) -> dict[str, Any]:
             f"\nnegative control, trained on {name}; on its own unseen units {_said(own)}"
         )
         print(
-            "P(fault): channel, load %, variant: healthy, broken, difference; windows "
+            "P(fault): channel, load %: healthy, broken, difference; windows "
             "unlike the training"
         )
         for row in rows:
@@ -225,7 +189,7 @@ def _print_control(row: Mapping[str, Any]) -> None:
         else "DIFFERS"
     )
     print(
-        f"  {row['channel']} {row['load']:>3} {row['variant']:<8}{row['fault_if_healthy']:.3f} "
+        f"  {row['channel']} {row['load']:>3} {row['fault_if_healthy']:.3f} "
         f"{row['fault_if_broken']:.3f} {row['difference']:+.3f} [{low:+.3f}, {high:+.3f}]  "
         f"{row['beyond_if_healthy']:.2f} {row['beyond_if_broken']:.2f}  {verdict}"
         f"{'' if row['channel'] == control.SCORED else ' (not scored)'}",
@@ -263,10 +227,7 @@ def _said(row: Mapping[str, Any]) -> str:
 
 
 def _one_thread() -> Any:
-    """One thread for torch and the BLAS.
-
-    Adapted networks are the same on every machine's number of cores.
-    """
+    """One thread for torch and the BLAS, so that figures do not depend on a number of cores."""
     import torch
     from threadpoolctl import threadpool_limits
 

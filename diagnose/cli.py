@@ -23,7 +23,6 @@ VERBS = {
     "predict": "try a trained network on a recording",
     "detect": "compare a recording with healthy ones of the same gearbox",
     "export": "write a trained network as ONNX",
-    "adapt": "move a trained network to a machine by its healthy recordings",
     "bridge": "what a simulation is worth on a measured machine, with comparators",
     "detectability": "which test shows a fault: maps over speed, torque, channel and bandwidth",
     "score": "score predictions of your own, beside a frozen benchmark",
@@ -39,6 +38,11 @@ OF_GENSIG = (
     "completion",
     "reproduce",
 )
+# verb of an older version -> what became of it
+REMOVED = {
+    "adapt": "removed in 0.15; use diagnose predict --healthy with a network trained with a "
+    "reference, or diagnose detect",
+}
 PROGRAM = "diagnose"
 FLAGS = "predict: unlike the training data; detect: changed"
 # module -> package of the extra, which an installation of gensig alone does not have
@@ -79,6 +83,8 @@ def _dispatch(words: list[str]) -> int:
     if words[0] in ("-V", "--version"):
         print(f"diagnose {__version__}")
         return 0
+    if words[0] in REMOVED:
+        raise ConfigError(f"'{words[0]}' was {REMOVED[words[0]]}")
     if words[0] not in VERBS:
         refuse_verb(PROGRAM, words[0], VERBS, "gensig", OF_GENSIG)
     verb, *rest = words

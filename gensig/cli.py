@@ -20,7 +20,6 @@ OF_DIAGNOSE = (
     "evaluate",
     "predict",
     "detect",
-    "adapt",
     "bridge",
     "detectability",
     "score",

@@ -22,6 +22,7 @@ IntArray = NDArray[np.integer]
 FloatArray = NDArray[np.floating]
 SUBSETS = ("train", "validation", "test")
 NORMALISATIONS = ("rms", "none")
+HEALTHY = "healthy"  # name of the class without a fault
 CROSS_SENSOR = "cross_sensor"  # the units of by_unit, tested on other channels
 IS_REFERENCE = "is_reference"  # 1: an extra sound record, neither example nor scored
 ROUNDING = 1e-6  # of a sample

@@ -1,1 +1,1 @@
-"""Networks: vibration in, class scores out; calibration, domain and adaptation of trained ones."""
+"""Networks: vibration in, class scores out; calibration and domain of trained ones."""

@@ -11,8 +11,7 @@ import torch
 from diagnose.data.packed_turns import tooth_counts
 from diagnose.data.targets import GEARS
 from diagnose.data.turns import Turns
-from diagnose.data.windows import FloatArray
-from diagnose.networks.adaptation import HEALTHY
+from diagnose.data.windows import HEALTHY, FloatArray
 from diagnose.networks.network import SiteNetwork
 from diagnose.recordings.prepared import prepare_recording
 from diagnose.recordings.source import Source

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnose.data.turns import Turns
-from diagnose.data.windows import subset_segments
-from diagnose.networks.adaptation import HEALTHY
+from diagnose.data.windows import HEALTHY, subset_segments
 from diagnose.networks.network import SiteNetwork
 from diagnose.recordings.accused import accused_of_turns
 from diagnose.recordings.registry import open_network

@@ -60,7 +60,6 @@ class PreparedRecording:
     duration_s : duration of the signal of one input
     held_out : samples that were held out of a recording that carried implants, `recording` is
         these; None for a whole one
-    carried : True for a whole recording that carried and is not scored
     """
 
     windows: WindowSet
@@ -70,32 +69,25 @@ class PreparedRecording:
     speed_rpm: float | None
     duration_s: float
     held_out: Stretch | None
-    carried: bool
 
 
 def prepare_recording(
     description: ModelDescription,
     inputs: NetworkInput,
     source: Source,
-    *,
-    is_scored: bool = True,
 ) -> PreparedRecording:
     """Inputs of a recording for a network, of the kind that it reads.
 
-    Parameters
-    ----------
-    is_scored : False for a recording that is only taken as healthy: it may have carried implants in
-        the training, as those of `Source.healthy` may
+    Recordings of `Source.healthy` may have carried implants in the training: nothing is judged by
+    them.
 
     Raises
     ------
     ConfigError    for a recording that cannot be read, is too short or too slowly sampled, or
         whose channels do not fit
-    DatasetError    for one that is scored and carried, unless what was held out is asked for
+    DatasetError    for one that carried, unless what was held out is asked for
     """
-    read = _without_carried(
-        description, _read(description, source), source, is_scored=is_scored
-    )
+    read = _without_carried(description, _read(description, source), source)
     played = _played(description, inputs, source, read, SPEED_OPTION)
     recording = played.recording
     sound = [
@@ -138,7 +130,6 @@ def prepare_recording(
             recording=float(n_recorded / recording.sampling_rate),
         ),
         held_out=read.held_out,
-        carried=read.carried,
     )
 
 
@@ -152,7 +143,7 @@ class _Read:
     recording : with the network's channels in their order
     channels : their names in the file
     tacho : (sample,) pulses, or None
-    held_out, carried : as in `PreparedRecording`
+    held_out : as in `PreparedRecording`
     """
 
     content: RecordingFile
@@ -160,7 +151,6 @@ class _Read:
     channels: tuple[str, ...]
     tacho: NDArray[Any] | None
     held_out: Stretch | None = None
-    carried: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -377,9 +367,9 @@ def _read(description: ModelDescription, source: Source) -> _Read:
 
 
 def _without_carried(
-    description: ModelDescription, read: _Read, source: Source, *, is_scored: bool
+    description: ModelDescription, read: _Read, source: Source
 ) -> _Read:
-    """The recording, or what was held out of it if it carried implants and is scored.
+    """The recording, or what was held out of it if it carried implants.
 
     Raises
     ------
@@ -392,9 +382,6 @@ def _without_carried(
     with suppress(ConfigError):  # other columns of the file may be no accelerations
         forms.append(recording_of(read.content, unit=source.unit, needs_level=False))
     digests = digests_of(source.file, *forms)
-    if not is_scored:
-        own = carried.of_recording(digests)
-        return replace(read, carried=any(block.carries for block in own))
     stretch = held_out_stretch(
         carried,
         digests,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.groups import groups_of
-from diagnose.data.windows import FloatArray, IntArray
+from diagnose.data.windows import HEALTHY, FloatArray, IntArray
 from diagnose.scoring.detection_curve import (
     LEAST_RECORDS,
     LEAST_SIZES,
@@ -36,7 +36,6 @@ BoolArray = NDArray[np.bool_]
 Sizes = Mapping[
     str, FloatArray
 ]  # quantity -> (record,) values of the records of a class
-HEALTHY = "healthy"
 FALSE_ALARMS = 0.05
 RECORDS_A_GROUP = 8  # fewer make a share meaningless
 MOST_GROUPS = 5

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from diagnose.data.windows import FloatArray, IntArray, Task
-    from diagnose.networks.adaptation import Statistics
     from diagnose.networks.domain import Domain
 
 # Columns of the data set that are written with each prediction, if it has them.
@@ -48,7 +47,7 @@ class Prediction:
     detail : description of the fit or training
     validation : the same for the validation records; None if they are test records too
     windows : of networks only, for each window of the test records
-    weights, domain, healthy, best_epoch, validation_loss, temperature, last_predicted : of
+    weights, domain, best_epoch, validation_loss, temperature, last_predicted : of
         networks only; `temperature` as in `diagnose.networks.calibration`, `last_predicted`
         (record,) the labels by the weights of the last epoch
     heads : of a network that has them, `diagnose.training.heads.predict_heads`
@@ -65,7 +64,6 @@ class Prediction:
     windows: Rows | None = None
     weights: dict[str, NDArray[Any]] | None = None
     domain: Domain | None = None
-    healthy: Statistics | None = None
     best_epoch: int = 0
     validation_loss: tuple[float, ...] = ()
     temperature: float = 1.0

@@ -18,7 +18,6 @@ from diagnose.data.protocols import HEALTHY_ONLY, OPEN_PROTOCOLS
 from diagnose.data.turns import REFERENCE
 from diagnose.data.window_input import Windows
 from diagnose.data.windows import SUBSETS, Task, WindowSet, subset_segments
-from diagnose.networks.adaptation import healthy_statistics
 from diagnose.networks.domain import Domain, fit_domain
 from diagnose.networks.network import Network
 from diagnose.networks.registry import input_of
@@ -184,10 +183,7 @@ def _run_training(
     )
     if shuffled:
         return prediction
-    prediction = replace(
-        _with_further_answers(prediction, training, test),
-        healthy=healthy_statistics(model, train, task.class_names),
-    )
+    prediction = _with_further_answers(prediction, training, test)
     if control not in ("", WITH_REFERENCE):
         return prediction
     domain = _domain(protocol, control, train, validation)

@@ -292,9 +292,8 @@ def _save(
 ) -> None:
     """Write the model of a prediction, with its score; a network's also with its domain."""
     tensors = dict(prediction.weights or {})
-    for part in (prediction.domain, prediction.healthy):
-        if part is not None:
-            tensors |= part.tensors()
+    if prediction.domain is not None:
+        tensors |= prediction.domain.tensors()
     score = test_score(task, prediction, settings.n_bootstrap)
     name, baseline = prediction.protocol, BASELINES.get(prediction.method)
     if prediction.method == WITH_REFERENCE:

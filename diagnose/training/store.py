@@ -21,7 +21,6 @@ from gensig.options.configuration import Section
 if TYPE_CHECKING:
     from torch import nn
 
-    from diagnose.networks.adaptation import Statistics
     from diagnose.networks.domain import Domain
     from diagnose.networks.network import Network
     from gensig.dataset.reader import Dataset
@@ -31,6 +30,7 @@ MODEL_SCHEMA_VERSION = 2
 READABLE_VERSIONS = (1, MODEL_SCHEMA_VERSION)
 SHOWN_MODELS = 12  # in an error message
 WEIGHTS, DESCRIPTION = "model.safetensors", "model.json"
+UNUSED = "adaptation."  # tensors of models of versions before 0.15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +47,7 @@ class ModelDescription:
         `n_teeth` says them
     temperature : see `diagnose.networks.calibration`; 1 in older models
     test_channel_names : of protocol cross_sensor
-    adaptation : see `diagnose.recordings.machine`; None as trained
+    adaptation : method and recordings of a model that a version before 0.15 adapted; else None
     test_score : see `diagnose.studies.study.test_score`; None in older models
     remaining_life : see `diagnose.training.life_store`; None for a classifier
     carried : blocks of recordings that carried implants; None for a network of any other data set,
@@ -219,13 +219,12 @@ def load_weights(model: nn.Module, folder: Path) -> None:
     """
     import torch
 
-    from diagnose.networks.adaptation import PREFIX
     from diagnose.networks.domain import TENSOR
 
     weights = {
         name: torch.from_numpy(value)
         for name, value in tensors_of(folder).items()
-        if name != TENSOR and not name.startswith(PREFIX)
+        if name != TENSOR and not name.startswith(UNUSED)
     }
     try:
         model.load_state_dict(weights)
@@ -248,21 +247,6 @@ def load_domain(folder: str | Path, description: ModelDescription) -> Domain | N
         return None
     try:
         return domain_from(description.out_of_distribution, tensors_of(Path(folder)))
-    except DatasetError as error:
-        raise DatasetError(f"{folder}: {error}") from None
-
-
-def load_statistics(folder: str | Path) -> Statistics | None:
-    """Statistics of healthy training windows in the network of a folder; None without them.
-
-    Raises
-    ------
-    DatasetError    for tensors that are no such statistics
-    """
-    from diagnose.networks.adaptation import statistics_from
-
-    try:
-        return statistics_from(tensors_of(Path(folder)))
     except DatasetError as error:
         raise DatasetError(f"{folder}: {error}") from None
 

@@ -47,7 +47,7 @@ class EnvelopeCnn(FeatureNetwork):
         super().__init__(input_scale)
         self.filters = nn.Conv1d(n_channels, width, kernel, bias=False)
         self.norm = nn.BatchNorm1d(width)
-        # adaptation and novelty expect the name "head"
+        # novelty expects the name "head"
         self.head = nn.Linear(2 * width, n_classes)
         self.add_heads(heads, 2 * width, n_classes)
 

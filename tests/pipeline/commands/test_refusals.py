@@ -64,7 +64,7 @@ REFUSED = {
     "diagnose train data=x out=y model=cnnn": "did you mean 'cnn' or 'wdcnn'?",
     "diagnose predict x.csv --modle y": "did you mean '--model'?",
     "diagnose detectability --speeds fast": "give numbers",
-    "diagnose adapt --model x --healthy a.csv --method adbn --out y": "is not one of adabn, coral",
+    "diagnose adapt --model x --healthy a.csv --method adabn --out y": "removed in 0.15",
     "gensig generate --config none out=x": "--config none does not exist",
     "gensig simulate --config x": "did you mean '--config-dir'?",
     "gensig plan --cfg hydra": "is not one of job",

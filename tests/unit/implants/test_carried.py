@@ -211,16 +211,6 @@ def test_records_of_a_second_set_are_refused_if_and_only_if_they_overlap(made):
             refuse_seen(carried, data, segments.of(~is_seen))
 
 
-def test_an_adapted_model_still_refuses(made, capsys, tmp_path):
-    """Adaptation itself judges nothing, and takes such a recording, with a word on it."""
-    out, file = tmp_path / "adapted", str(made / "monday.npz")
-    words = ["--healthy", file, "--method", "coral", "--out", str(out)]
-    assert main(["adapt", "--model", str(model(made)), *words]) == 0
-    assert f"{file}: carried implants in the training" in capsys.readouterr().out
-    assert read_description(out).carried == read_description(model(made)).carried
-    assert "--held-out" in refused(capsys, "predict", "--model", out, file)
-
-
 def described(made, folder):
     """Content of the description of a copy of the model."""
     shutil.copytree(model(made), folder, dirs_exist_ok=True)

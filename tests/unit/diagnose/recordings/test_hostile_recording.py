@@ -59,11 +59,3 @@ def test_a_crash_for_certain_is_one_line(name, files, capsys, monkeypatch):
     assert main(words) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert ".mat cannot be read: its reader crashed (SIGSEGV)" in line
-
-
-def test_adapt_answers_in_one_line(model, files, capsys):
-    words = ["adapt", "--model", str(model), "--healthy", "r.mat", "--method", "coral"]
-    assert diagnose.cli.main([*words, "--out", "adapted"]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "r.mat cannot be read: it" in line
-    assert not (files / "adapted").exists()

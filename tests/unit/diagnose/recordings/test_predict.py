@@ -115,6 +115,30 @@ def test_the_given_speed_is_compared_with_those_of_the_training(
     assert "4000 r/min is outside" in line
 
 
+def test_a_folder_of_a_version_that_adapted_is_still_predicted_with(
+    model, signals, recorded, tmp_path, capsys
+):
+    """Statistics of healthy windows beside the weights are left alone, and the answer says so."""
+    file = recorded(signals[0])
+    tensors = load_file(f"{model}/model.safetensors")
+    assert not any(name.startswith("adaptation.") for name in tensors)
+    description = json.loads(Path(model, "model.json").read_text())
+    old = {"adaptation.features": np.ones((3, 2)), "adaptation.mean.x": np.ones(2)}
+    facts = {"method": "coral", "matched": "healthy", "recordings": []}
+    save_file(tensors | old, tmp_path / "model.safetensors")
+    text = json.dumps({**description, "adaptation": facts})
+    (tmp_path / "model.json").write_text(text)
+
+    words = ("predict", file, "--json", "--model")
+    as_trained, adapted = (
+        json.loads(says(capsys, *words, folder)) for folder in (model, tmp_path)
+    )
+    assert as_trained.pop("adaptation") is None
+    assert adapted.pop("adaptation") == facts
+    assert as_trained | {"model": ""} == adapted | {"model": ""}
+    assert "before it was adapted" in says(capsys, *words[:2], "--model", tmp_path)
+
+
 CLEAR = {"healthy": 0.61, "crack": 0.3, "pitting": 0.09}
 CLOSE = {"healthy": 0.35, "crack": 0.3, "pitting": 0.26, "missing_tooth": 0.09}
 SCORE = {

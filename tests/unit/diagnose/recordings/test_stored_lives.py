@@ -217,21 +217,7 @@ def test_classifiers_and_networks_of_lives_are_not_confused(
     with refused("is a classifier and says no remaining", DatasetError):
         load_life_model(model)
 
-    file, out = recorded(lives.signals(0)), tmp_path / "moved"
-    words = [
-        "--model",
-        models["cnn"],
-        "--healthy",
-        file,
-        "--out",
-        out,
-    ]
-    refuses(
-        capsys,
-        ["adapt", *words, "--method", "adabn"],
-        "is no classifier",
-    )
-
+    file = recorded(lives.signals(0))
     words = ["predict", "--model", model, file, "--torque-nm", "20"]
     refuses(capsys, words, "--torque-nm is for models of remaining life")
 
