@@ -29,20 +29,30 @@ OTHER_SENSORS = (
     "sensing.path.natural_frequency_hz=[150,6000]",
     "sensing.sensor.mounted_resonance_hz=9000",
 )  # assumed
+HARD = (
+    "sensing=machine",
+    "system.supports=bearings",
+    "quality.support_damping_ratio_low=0.01",
+    "quality.support_damping_ratio_high=0.1",
+    "quality.iso1328_grade=7",
+)
 WORLDS = {
     "paths": (*HOUSING, "seed=1"),
     "sensors": (*HOUSING, "seed=3", *OTHER_SENSORS),
-    "machines": (
-        *BASE,
-        "sensing=machine",
-        "seed=2",
-        "system.supports=bearings",
-        "quality.support_damping_ratio_low=0.01",
-        "quality.support_damping_ratio_high=0.1",
-        "quality.iso1328_grade=7",
-        *OTHER_SENSORS,
-    ),
+    "machines": (*BASE, *HARD, "seed=2", *OTHER_SENSORS),
 }
+# Machines of which each has gears and a housing of its own; the worlds have five sets of gears.
+MANY = (
+    "experiment=quickstart",
+    "plan.n_units=150",
+    "plan.n_records=600",
+    "plan.n_reference=2",
+    "plan.fault_gear=as_given",
+    "operating.duration_s=0.5",
+    *STORED,
+)
+SEPARATE = (*MANY, "sensing=housing", "seed=11")
+SEPARATE_MACHINES = (*MANY, *HARD, "seed=12")
 # Randomised training set of gears of the worlds' name plate; nothing else of them is in it. The
 # module varies by 1 in 200, since accuracy is drawn once a unit only with a size of the gears.
 DRAWN = {

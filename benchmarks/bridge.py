@@ -52,13 +52,23 @@ COMPARED = (
 ALONE, NEW = "by_unit", "new_machine"
 QUIET = ("model.whitened=machine",)
 REDRAWN = (*QUIET, "model.redraws=8")
+REDRAWN_LESS = (*QUIET, "model.redraws=4")
+# name of a set, as of its folder -> overrides
+SETS = {
+    "source": worlds.SOURCE,
+    "bridge": worlds.BRIDGE,
+    "separate": worlds.SEPARATE,
+    "separate_machines": worlds.SEPARATE_MACHINES,
+}
 PLAIN = "no healthy"  # on windows, with the words of TRAINING alone
 WITH_HEALTHY = {
-    "two healthy": (worlds.SOURCE, ALONE, ()),
-    "without ringing": (worlds.SOURCE, ALONE, QUIET),
-    "without ringing, re-drawn": (worlds.SOURCE, ALONE, REDRAWN),
-    "randomised": (worlds.BRIDGE, NEW, QUIET),
-    "randomised, re-drawn": (worlds.BRIDGE, NEW, REDRAWN),
+    "two healthy": ("source", ALONE, ()),
+    "without ringing": ("source", ALONE, QUIET),
+    "without ringing, re-drawn": ("source", ALONE, REDRAWN),
+    "randomised": ("bridge", NEW, QUIET),
+    "randomised, re-drawn": ("bridge", NEW, REDRAWN),
+    "many machines, re-drawn": ("separate", NEW, REDRAWN_LESS),
+    "many hard machines, re-drawn": ("separate_machines", NEW, REDRAWN_LESS),
 }
 TOLD = (
     "cpu_model",
@@ -114,10 +124,9 @@ def judge_with_healthy(
     """
     mark = "".join(f"_{name}" for name in classes)
     networks: dict[str, tuple[list[Path], Dataset]] = {}
-    for name, (words, protocol, own) in WITH_HEALTHY.items():
-        place = "bridge" if words is worlds.BRIDGE else "source"
-        data = folder / f"{place}{mark}"
-        opened = worlds.open_world(data, words, classes)
+    for name, (set_name, protocol, own) in WITH_HEALTHY.items():
+        data = folder / f"{set_name}{mark}"
+        opened = worlds.open_world(data, SETS[set_name], classes)
         target = folder / f"{name.replace(',', '').replace(' ', '_')}{mark}"
         models = trained(target, data, *COMPARED, *own, protocol=protocol)
         networks[name] = models, opened
