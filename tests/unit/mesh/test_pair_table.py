@@ -109,6 +109,10 @@ class TestFlankSides:
             assert_close(result, expected, 1e-12)
 
 
+# Share of the largest gap that a line between nodes may miss: a rough flank has many kinks.
+BETWEEN_NODES = {"surface_damage": 1e-2}
+
+
 class TestRows:
     @pytest.mark.parametrize("gear", GEARS)
     @pytest.mark.parametrize("kind", KINDS)
@@ -125,7 +129,7 @@ class TestRows:
             side.gap[side.kind[0]] - side.gap[0],
         )
         # linear between nodes, whose parabolas round off steps, against the value itself
-        atol = 2e-9 + 3e-3 * np.abs(expected).max()
+        atol = 2e-9 + BETWEEN_NODES.get(kind, 3e-3) * np.abs(expected).max()
 
         assert_close(curves.faulty_pair_gap, expected, atol=atol)
         assert np.all(np.isfinite(side.compliance))
