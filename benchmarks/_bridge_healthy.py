@@ -43,7 +43,7 @@ HELD_BACK = ("validation", "test")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answers:
-    """What networks say of records.
+    """Answers of networks for records.
 
     Attributes
     ----------

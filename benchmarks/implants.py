@@ -29,6 +29,7 @@ from gensig.dataset.reader import Dataset
 from gensig.implants.implanting import implant_records
 from gensig.implants.options import ImplantOptions
 from gensig.implants.simulated_pairs import CLASSES, SimulatedPairs, class_of
+from gensig.signals.handbook_rule import handbook_rule
 from gensig.signals.indicators import kurtosis
 from gensig.signals.recording import Recording
 from gensig.signals.resampling import rate_change
@@ -79,7 +80,6 @@ NETWORK = {
 }
 N_STEPS, BATCH, RATE_OF_LEARNING = 500, 16, 3e-3
 SEEDS = (0, 1)
-RULE_KURTOSIS, RULE_LEVEL_DB = 6.0, 3.0  # of the handbook rule
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -287,10 +287,8 @@ def rule(judged: Judged) -> np.ndarray:
     for signal in judged.signals:
         louder = 20.0 * np.log10(signal.std() / level)
         windows = signal[0, : signal.shape[-1] // WINDOW * WINDOW].reshape(-1, WINDOW)
-        if np.mean(kurtosis(windows)) > RULE_KURTOSIS:
-            answers.append(1)
-        else:
-            answers.append(2 * int(louder > RULE_LEVEL_DB))
+        state = handbook_rule(float(np.mean(kurtosis(windows))), louder)
+        answers.append(CLASSES.index(state))
     return np.array(answers)
 
 

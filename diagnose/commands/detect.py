@@ -5,7 +5,13 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from diagnose.commands.parser import add_recording_options
+from diagnose.commands.parser import (
+    add_healthy_speed,
+    add_recording_options,
+    add_recordings,
+    add_sampling_rate,
+    add_tacho,
+)
 
 if TYPE_CHECKING:
     from diagnose.detection.followed_shafts import FollowedRecording
@@ -29,12 +35,7 @@ EXITS = {0: "healthy", CHANGED: "at least one recording is changed"}
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of the verb."""
-    parser.add_argument(
-        "recording",
-        metavar="RECORDING",
-        nargs="+",
-        help="one or more: .csv, .wav, .npy, .npz, .h5, .hdf5 or .mat",
-    )
+    add_recordings(parser)
     parser.add_argument(
         "--healthy",
         metavar="FILE",
@@ -82,30 +83,9 @@ def _add_speed(parser: ArgumentParser) -> None:
         metavar="RPM",
         help="of the input shaft, within 3 %%; not needed with --tacho",
     )
-    parser.add_argument(
-        "--healthy-speed-rpm",
-        type=float,
-        metavar="RPM",
-        help="of the healthy recordings (default: --speed-rpm)",
-    )
-    parser.add_argument(
-        "--sampling-rate",
-        type=float,
-        metavar="HZ",
-        help="samples a second, where the file is silent",
-    )
-    parser.add_argument(
-        "--tacho",
-        metavar="CHANNEL",
-        help="pulses of the input shaft, to follow its speed",
-    )
-    parser.add_argument(
-        "--pulses-per-turn",
-        type=int,
-        default=1,
-        metavar="N",
-        help="of --tacho (default: 1)",
-    )
+    add_healthy_speed(parser)
+    add_sampling_rate(parser)
+    add_tacho(parser, "input")
 
 
 def run(arguments: Namespace) -> int:

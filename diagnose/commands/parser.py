@@ -21,6 +21,52 @@ def add_model(parser: ArgumentParser, *, required: bool = True) -> None:
     parser.add_argument("--model", required=required, metavar="DIR", help=text)
 
 
+def add_recordings(parser: ArgumentParser) -> None:
+    """Add the recordings that are looked at."""
+    parser.add_argument(
+        "recording",
+        metavar="RECORDING",
+        nargs="+",
+        help="one or more: .csv, .wav, .npy, .npz, .h5, .hdf5 or .mat",
+    )
+
+
+def add_sampling_rate(parser: ArgumentParser) -> None:
+    """Add the rate of recordings that do not tell theirs."""
+    parser.add_argument(
+        "--sampling-rate",
+        type=float,
+        metavar="HZ",
+        help="samples a second, where the file is silent",
+    )
+
+
+def add_healthy_speed(parser: ArgumentParser) -> None:
+    """Add the speed of healthy recordings."""
+    parser.add_argument(
+        "--healthy-speed-rpm",
+        type=float,
+        metavar="RPM",
+        help="of the healthy recordings (default: --speed-rpm)",
+    )
+
+
+def add_tacho(parser: ArgumentParser, shaft: str) -> None:
+    """Add the channel with the pulses of a shaft, which the help names."""
+    parser.add_argument(
+        "--tacho",
+        metavar="CHANNEL",
+        help=f"pulses of the {shaft} shaft, to follow its speed",
+    )
+    parser.add_argument(
+        "--pulses-per-turn",
+        type=int,
+        default=1,
+        metavar="N",
+        help="of --tacho (default: 1)",
+    )
+
+
 def add_recording_options(parser: ArgumentParser) -> None:
     """Add options on how a recording is read."""
     parser.add_argument(

@@ -6,7 +6,14 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from diagnose.commands.parser import add_model, add_recording_options
+from diagnose.commands.parser import (
+    add_healthy_speed,
+    add_model,
+    add_recording_options,
+    add_recordings,
+    add_sampling_rate,
+    add_tacho,
+)
 from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -42,12 +49,7 @@ EXITS = {
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of the verb."""
-    parser.add_argument(
-        "recording",
-        metavar="RECORDING",
-        nargs="+",
-        help="one or more: .csv, .wav, .npy, .npz, .h5, .hdf5 or .mat",
-    )
+    add_recordings(parser)
     add_model(parser, required=False)
     _add_rotation(parser)
     add_recording_options(parser)
@@ -90,22 +92,12 @@ def _add_healthy(parser: ArgumentParser) -> None:
         default=[],
         help="of the same machine when sound, for models with_reference",
     )
-    parser.add_argument(
-        "--healthy-speed-rpm",
-        type=float,
-        metavar="RPM",
-        help="of the healthy recordings (default: --speed-rpm)",
-    )
+    add_healthy_speed(parser)
 
 
 def _add_rotation(parser: ArgumentParser) -> None:
     """Add the arguments on rates, speeds and order tracking."""
-    parser.add_argument(
-        "--sampling-rate",
-        type=float,
-        metavar="HZ",
-        help="samples a second, where the file is silent",
-    )
+    add_sampling_rate(parser)
     parser.add_argument(
         "--speed-rpm",
         type=float,
@@ -119,18 +111,7 @@ def _add_rotation(parser: ArgumentParser) -> None:
         metavar=("DRIVING", "DRIVEN"),
         help="was it trained at such?",
     )
-    parser.add_argument(
-        "--tacho",
-        metavar="CHANNEL",
-        help="pulses of the driving shaft, to follow its speed",
-    )
-    parser.add_argument(
-        "--pulses-per-turn",
-        type=int,
-        default=1,
-        metavar="N",
-        help="of --tacho (default: 1)",
-    )
+    add_tacho(parser, "driving")
     parser.add_argument(
         "--to-speed",
         type=float,

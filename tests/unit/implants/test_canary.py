@@ -1,4 +1,4 @@
-"""What tells the classes of implants: the residual, and nothing else."""
+"""Nothing but the residual tells the classes of implants."""
 
 import numpy as np
 import pytest
