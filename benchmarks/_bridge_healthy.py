@@ -23,6 +23,7 @@ from diagnose.data.windows import (
     subset_segments,
     task_of,
 )
+from diagnose.networks.network import Network
 from diagnose.networks.registry import input_of
 from diagnose.scoring.metrics import (
     balanced_accuracy,
@@ -58,40 +59,71 @@ class Answers:
     shift: FloatArray
 
 
-def answers_of(models: Sequence[Path], trained_on: Dataset, world: Dataset) -> Answers:
-    """Answers of networks for all records of a world.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judge:
+    """Networks of one training, one a seed, with the threshold of each.
 
-    Those on turns compare each with the sound ones of its machine.
+    Attributes
+    ----------
+    networks : the networks
+    description : of the first; the others differ by their seed
+    shift : (network,) added to the log-probability of healthy
     """
-    said, shifts = [], []
-    for folder in models:
-        network, description = load_model(folder)
-        inputs = input_of(description.network)
-        task = _task(description, trained_on)
-        healthy = task.class_names.index(HEALTHY)
-        held_back = [
-            inputs.load(
-                task, subset_segments(task, description.protocol, subset), training=True
-            )
-            for subset in HELD_BACK
+
+    networks: tuple[Network, ...]
+    description: ModelDescription
+    shift: FloatArray
+
+    def answers(self, world: Dataset) -> Answers:
+        """Answers for all records of a world.
+
+        Networks on turns compare each with the sound ones of its machine.
+        """
+        task = _task(self.description, world)
+        windows = input_of(self.description.network).load(task, _examples(task))
+        said = [
+            over_records(predict_windows(network, windows), windows.record)[1]
+            for network in self.networks
         ]
-        shifts.append(
-            healthy_shift(
-                np.concatenate([predict_windows(network, part) for part in held_back]),
-                np.concatenate([part.label for part in held_back]),
-                healthy,
-            )
+        record = np.unique(windows.record)
+        return Answers(
+            label=task.labels()[record],
+            unit=np.asarray(world.column("unit_id"))[record],
+            log_probability=np.stack(said),
+            shift=self.shift,
         )
-        other = _task(description, world)
-        windows = inputs.load(other, _examples(other))
-        said.append(over_records(predict_windows(network, windows), windows.record)[1])
-    record = np.unique(windows.record)
-    return Answers(
-        label=other.labels()[record],
-        unit=np.asarray(world.column("unit_id"))[record],
-        log_probability=np.stack(said),
-        shift=np.array(shifts),
-    )
+
+
+def judge_of(models: Sequence[Path], trained_on: Dataset) -> Judge:
+    """Networks of one training; each threshold is fitted on machines that the training held back.
+
+    Parameters
+    ----------
+    models : folders of the networks
+    trained_on : data set of the training
+    """
+    loaded = [load_model(folder) for folder in models]
+    description = loaded[0][1]
+    networks = tuple(network for network, _ in loaded)
+    task = _task(description, trained_on)
+    inputs = input_of(description.network)
+    held_back = [
+        inputs.load(
+            task, subset_segments(task, description.protocol, subset), training=True
+        )
+        for subset in HELD_BACK
+    ]
+    label = np.concatenate([part.label for part in held_back])
+    healthy = task.class_names.index(HEALTHY)
+    shifts = [
+        healthy_shift(
+            np.concatenate([predict_windows(network, part) for part in held_back]),
+            label,
+            healthy,
+        )
+        for network in networks
+    ]
+    return Judge(networks=networks, description=description, shift=np.array(shifts))
 
 
 def healthy_shift(

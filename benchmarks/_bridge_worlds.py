@@ -41,6 +41,23 @@ WORLDS = {
     "sensors": (*HOUSING, "seed=3", *OTHER_SENSORS),
     "machines": (*BASE, *HARD, "seed=2", *OTHER_SENSORS),
 }
+# The worlds have five sets of gears each. Beside them: every unit with gears and a housing of its
+# own, and units at one speed and one load, within 1 and 10 %, as their sound records are.
+OWN_GEARS = ("plan.machines=separate", "plan.n_gearboxes=null")
+POINT = {
+    "operating.speed_rpm": "{distribution: uniform, low: 1782, high: 1818}",
+    "operating.torque_nm": "{distribution: uniform, low: 22.5, high: 27.5}",
+}
+ONE_POINT = (
+    "plan.vary={" + ", ".join(f"{key}: {value}" for key, value in POINT.items()) + "}",
+)
+BESIDE = {
+    **{
+        f"{name}, own gears": (*words, *OWN_GEARS, "seed=21")
+        for name, words in WORLDS.items()
+    },
+    **{f"{name}, one point": (*words, *ONE_POINT) for name, words in WORLDS.items()},
+}
 # Machines of which each has gears and a housing of its own; the worlds have five sets of gears.
 MANY = (
     "experiment=quickstart",

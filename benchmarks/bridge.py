@@ -29,7 +29,6 @@ from benchmarks import _bridge_worlds as worlds
 from benchmarks._measure import machine, print_machine
 from benchmarks._realism_recording import VARIABLE
 from diagnose.cli import main as diagnose_main
-from gensig.dataset.reader import Dataset
 from gensig.errors import ConfigError, GensigError
 
 TRAINING = (
@@ -105,55 +104,91 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _judged(folder: Path, options: argparse.Namespace) -> dict[str, Any]:
     """All parts of the benchmark; with other classes those of the worlds alone."""
     classes = options.classes.split(",") if options.classes else []
-    result = {"with_healthy": judge_with_healthy(folder, classes, options.model)}
-    if not classes and not options.model:
+    chosen = options.networks or list(WITH_HEALTHY)
+    networks = networks_with_healthy(folder, classes, chosen, options.model)
+    result = {"with_healthy": judge_worlds(folder, classes, networks)}
+    if not classes and not options.model and not options.networks:
         result["control"] = judge_control(folder)
     return result
 
 
-def judge_with_healthy(
-    folder: Path, classes: Sequence[str] = (), further: Sequence[str] = ()
-) -> dict[str, Any]:
-    """Scores in each world of networks that compare with its healthy records, and of one without.
+def networks_with_healthy(
+    folder: Path,
+    classes: Sequence[str],
+    chosen: Sequence[str],
+    further: Sequence[str] = (),
+) -> dict[str, healthy.Judge]:
+    """Networks that compare with healthy records, and one without, by name.
 
     Parameters
     ----------
     folder : of data sets and models
     classes : of all sets, in place of theirs
-    further : networks to judge beside those of the benchmark, each as ``NAME=MODEL=DATA``
+    chosen : names of `WITH_HEALTHY`; all of them bring the network without healthy records
+    further : networks to judge beside those, each as ``NAME=MODEL=DATA``
     """
-    mark = "".join(f"_{name}" for name in classes)
-    networks: dict[str, tuple[list[Path], Dataset]] = {}
-    for name, (set_name, protocol, own) in WITH_HEALTHY.items():
+    mark = _mark(classes)
+    result: dict[str, healthy.Judge] = {}
+    for name in chosen:
+        set_name, protocol, own = WITH_HEALTHY[name]
         data = folder / f"{set_name}{mark}"
         opened = worlds.open_world(data, SETS[set_name], classes)
-        target = folder / f"{name.replace(',', '').replace(' ', '_')}{mark}"
+        target = folder / f"{_file_name(name)}{mark}"
         models = trained(target, data, *COMPARED, *own, protocol=protocol)
-        networks[name] = models, opened
-    data = folder / f"source{mark}"
-    models = trained(folder / f"model{mark}", data)
-    networks[PLAIN] = models, worlds.open_world(data, worlds.SOURCE, classes)
+        result[name] = healthy.judge_of(models, opened)
+    if len(chosen) == len(WITH_HEALTHY):
+        data = folder / f"source{mark}"
+        models = trained(folder / f"model{mark}", data)
+        opened = worlds.open_world(data, worlds.SOURCE, classes)
+        result[PLAIN] = healthy.judge_of(models, opened)
     for text in further:
-        name, model, data = text.split("=", 2)
-        networks[name] = [Path(model)], gensig.open_dataset(data)
+        name, model, place = text.split("=", 2)
+        result[name] = healthy.judge_of([Path(model)], gensig.open_dataset(place))
+    return result
+
+
+def judge_worlds(
+    folder: Path, classes: Sequence[str], networks: Mapping[str, healthy.Judge]
+) -> dict[str, Any]:
+    """Scores of networks in each world, and in the three of one that was trained there.
+
+    Parameters
+    ----------
+    folder : of data sets and models
+    classes : of all sets, in place of theirs
+    networks : by name
+    """
+    mark = _mark(classes)
+    beside = {} if classes else worlds.BESIDE
     result: dict[str, Any] = {}
-    for world_name, words in worlds.WORLDS.items():
-        world = worlds.open_world(folder / f"{world_name}{mark}", words, classes)
+    for world_name, words in {**worlds.WORLDS, **beside}.items():
+        target = f"{_file_name(world_name)}{mark}"
+        world = worlds.open_world(folder / target, words, classes)
         print(f"\n{world_name}: all units")
-        result[world_name] = {}
-        for name, (models, opened) in networks.items():
-            answers = healthy.answers_of(models, opened, world)
+        result[world_name] = rows = {}
+        for name, judge in networks.items():
+            answers = judge.answers(world)
             for shifted in (False,) if name == PLAIN else (False, True):
                 row = healthy.scores_of(answers, world.class_names, shifted=shifted)
                 key = f"{name}, threshold" if shifted else name
-                result[world_name][key] = row
+                rows[key] = row
                 recall = " ".join(f"{each:.2f}" for each in row["recall"].values())
-                print(f"  {key:<36}{_said(row)}  recall {recall}", flush=True)
-        target = folder / f"healthy_{world_name}{mark}"
-        trained(target, world.folder, *COMPARED, *QUIET)
-        result[world_name]["trained there"] = there = _own_score(target)
-        print(f"  {'trained there':<36}{_said(there)} on its own test units")
+                print(f"  {key:<40}{_said(row)}  recall {recall}", flush=True)
+        if PLAIN in networks and world_name in worlds.WORLDS:
+            there = folder / f"healthy_{target}"
+            trained(there, world.folder, *COMPARED, *QUIET)
+            rows["trained there"] = own = _own_score(there)
+            print(f"  {'trained there':<40}{_said(own)} on its own test units")
     return result
+
+
+def _mark(classes: Sequence[str]) -> str:
+    """End of the names of all folders of these classes."""
+    return "".join(f"_{name}" for name in classes)
+
+
+def _file_name(name: str) -> str:
+    return name.replace(",", "").replace(" ", "_")
 
 
 def judge_control(folder: Path) -> dict[str, Any]:
@@ -263,6 +298,12 @@ def _parser() -> argparse.ArgumentParser:
         metavar="A,B",
         help="make sets and worlds with these classes, healthy first, and judge the networks "
         "that compare with healthy records",
+    )
+    parser.add_argument(
+        "--networks",
+        nargs="+",
+        choices=list(WITH_HEALTHY),
+        help="train and judge these alone",
     )
     parser.add_argument(
         "--model",

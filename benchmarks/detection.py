@@ -60,6 +60,7 @@ POINT = (
 CHANNEL = "housing_top"
 RANGE_SEED = 1
 TEETH_OFF = 2  # a tooth counts as found within so many: it rings after it was hit
+N_REMOUNTED = 6  # mountings in which every sound record is judged
 BAND_DB = 6.0  # standard deviation of a mounting's gain, dB, from band to band; assumed
 N_BANDS = 8
 
@@ -154,7 +155,8 @@ def _judged(dataset: Dataset, case: Case) -> list[Judged]:
     for machine in sorted(set(unit)):
         records = np.flatnonzero((unit == machine) & dataset.usable)
         rng = np.random.default_rng(abs(int(str(machine).rpartition("-")[2])))
-        gains = rng.normal(0.0, BAND_DB, (case.n_mountings + 1, N_BANDS))
+        n_drawn = case.n_mountings + N_REMOUNTED
+        gains = rng.normal(0.0, BAND_DB, (n_drawn, N_BANDS))
 
         def followed(
             record: int, mounting: int | None = None, gains: Any = gains
@@ -177,17 +179,29 @@ def _judged(dataset: Dataset, case: Case) -> list[Judged]:
         for record in records:
             if record in used:
                 continue
-            own = followed(record, case.n_mountings if case.remounted else None)
-            judged.append(
-                Judged(
-                    state=str(state[record]),
-                    gear=str(gear[record]),
-                    severity=float(severity[record]),
-                    tooth=_tooth(dataset, record),
-                    finding=model.judge_followed(own),
+            for mounting in _mountings(case, str(state[record])):
+                own = followed(record, mounting)
+                judged.append(
+                    Judged(
+                        state=str(state[record]),
+                        gear=str(gear[record]),
+                        severity=float(severity[record]),
+                        tooth=_tooth(dataset, record),
+                        finding=model.judge_followed(own),
+                    )
                 )
-            )
     return judged
+
+
+def _mountings(case: Case, state: str) -> list[int | None]:
+    """Numbers of the mountings in which a record is judged; None is that of the healthy ones.
+
+    A sound record is judged in several: mountings differ more than records of one mounting.
+    """
+    if not case.remounted:
+        return [None]
+    n_judged = N_REMOUNTED if state == "healthy" else 1
+    return [case.n_mountings + number for number in range(n_judged)]
 
 
 def _recording(dataset: Dataset, record: int, case: Case) -> Recording:

@@ -1,7 +1,8 @@
 """``python -m benchmarks.implants``: are implants worth more than simulations, and more than noise?
 
-Simulated machines stand for real ones: a housing, ball bearings, grade 7, wandering speed, other
-teeth. Some of their healthy records carry implants; a small network that is trained on these
+Simulated machines stand for real ones: two of other teeth, with a housing, ball bearings, grade 7
+and wandering speed, and one of each world of ``benchmarks.bridge`` in records of 2 s. Some of their
+healthy records carry implants; a small network that is trained on these
 judges the machine's own faulty records. Beside it the same network on simulations alone, on
 implants of noise bursts and of shuffled phases, on implants of nothing, and the handbook rule.
 """
@@ -23,6 +24,7 @@ import numpy as np
 import torch
 
 import gensig
+from benchmarks._bridge_worlds import WORLDS
 from benchmarks._measure import machine, print_machine
 from diagnose.networks.registry import build_model
 from gensig.dataset.reader import Dataset
@@ -49,19 +51,56 @@ SOURCE = (
     "operating.duration_s=0.5",
 )
 OF_MACHINE = (
-    "experiment=realistic",
     FAULTS,
     "plan.n_units=1",
     "plan.n_records=50",
+    "plan.n_reference=0",
     "operating.torque_nm=20",
     "sensing.snr_db=20",
     "operating.duration_s=2",
 )
-MACHINES: Mapping[str, tuple[tuple[int, int], float, int]] = {
-    "m1": ((31, 67), 1500.0, 21),  # teeth, r/min, seed
-    "m2": ((27, 49), 1900.0, 22),
-}
+ONE_UNIT = ("plan.n_gearboxes=1",)  # of a world
 CHANNEL = "housing_input"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rig:
+    """A simulated machine that stands for a real one.
+
+    Attributes
+    ----------
+    words : overrides of its data set
+    teeth : of the driving and the driven gear
+    speed_rpm : of the driving shaft
+    """
+
+    words: tuple[str, ...]
+    teeth: tuple[int, int]
+    speed_rpm: float
+
+    def overrides(self) -> tuple[str, ...]:
+        """All overrides of its data set."""
+        return (
+            *self.words,
+            *OF_MACHINE,
+            f"gear.pinion.n_teeth={self.teeth[0]}",
+            f"gear.wheel.n_teeth={self.teeth[1]}",
+            f"operating.speed_rpm={self.speed_rpm:g}",
+        )
+
+
+MACHINES: Mapping[str, Rig] = {
+    "m1": Rig(
+        words=("experiment=realistic", "seed=21"), teeth=(31, 67), speed_rpm=1500.0
+    ),
+    "m2": Rig(
+        words=("experiment=realistic", "seed=22"), teeth=(27, 49), speed_rpm=1900.0
+    ),
+    **{
+        name: Rig(words=(*words, *ONE_UNIT), teeth=(23, 84), speed_rpm=1800.0)
+        for name, words in WORLDS.items()
+    },
+}
 N_CARRIERS = 6  # of the machine's ten healthy records
 KINDS = ("physics", "noise_bursts", "shuffled_phases", "none")
 N_IMPLANTS = 240
@@ -116,20 +155,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def judge(source: Dataset, name: str, folder: Path) -> dict[str, Any]:
     """Balanced accuracy and recalls of every arm on one machine, printed too."""
-    teeth, speed, seed = MACHINES[name]
-    words = (
-        f"gear.pinion.n_teeth={teeth[0]}",
-        f"gear.wheel.n_teeth={teeth[1]}",
-        f"operating.speed_rpm={speed:g}",
-        f"seed={seed}",
-    )
-    data = gensig.generate(*OF_MACHINE, *words, out=folder / name, reuse=True)
+    rig = MACHINES[name]
+    data = gensig.generate(*rig.overrides(), out=folder / name, reuse=True)
     judged = judged_records(data)
     results: dict[str, Any] = {"handbook rule": scored(rule(judged), judged.labels)}
     tell(name, "handbook rule", results["handbook rule"])
     results["its own records"] = own_records(judged)
     tell(name, "its own records", results["its own records"])
-    for arm, (signals, labels) in arms(source, judged, teeth, speed):
+    for arm, (signals, labels) in arms(source, judged, rig):
         runs = []
         for run in SEEDS:
             network = trained(signals, labels, run)
@@ -165,7 +198,7 @@ def judged_records(data: Dataset) -> Judged:
 
 
 def arms(
-    source: Dataset, judged: Judged, teeth: tuple[int, int], speed: float
+    source: Dataset, judged: Judged, rig: Rig
 ) -> Iterator[tuple[str, tuple[list[np.ndarray], np.ndarray]]]:
     """Training signals, (1, sample) each, and labels by the name of the arm."""
     yield "simulations alone", simulations(source)
@@ -178,8 +211,8 @@ def arms(
         made = implant_records(
             source,
             judged.carriers,
-            teeth=teeth,
-            speed_rpm=speed,
+            teeth=rig.teeth,
+            speed_rpm=rig.speed_rpm,
             options=ImplantOptions(
                 gain_db=gain,
                 n_records=N_IMPLANTS,

@@ -52,6 +52,17 @@ class References:
         """True for a recording of another mounting."""
         return index >= len(self.recordings) - self.n_mountings
 
+    @property
+    def alike_one_to_judge(self) -> tuple[int, ...]:
+        """References that a healthy recording to judge is exchangeable with.
+
+        The other mountings, where it may have another mounting; else all.
+        """
+        everything = range(len(self.recordings))
+        if not self.is_remounted:
+            return tuple(everything)
+        return tuple(index for index in everything if self.is_mounting(index))
+
     def measured(self, recording: BlockedRecording) -> Measured:
         """Features of a recording against each of the references."""
         changes = []
@@ -109,7 +120,7 @@ class Judge:
     folds : one for each reference held back
     scale : (group,) usual distance of the group's features
     threshold : of the score
-    held_back : (reference,) score of each when held back
+    held_back : (reference,) score of each when held back, of those alike the one to judge
     """
 
     columns: dict[Group, NDArray[np.intp]]
@@ -177,10 +188,11 @@ def make_judge(
         _distances(own, fold.spread, columns)
         for own, fold in zip(values, folds, strict=True)
     ]
-    blocks = np.concatenate(distances)
+    alike = [distances[index] for index in references.alike_one_to_judge]
+    blocks = np.concatenate(alike)
     sums = np.square(blocks).sum(axis=0) + DISTANCE_WEIGHT * PRIOR_DISTANCE**2
     scale = np.sqrt(sums / (len(blocks) + DISTANCE_WEIGHT))
-    scores = np.array([score_of(blocks / scale) for blocks in distances])
+    scores = np.array([score_of(blocks / scale) for blocks in alike])
     return Judge(
         columns=columns,
         folds=tuple(folds),

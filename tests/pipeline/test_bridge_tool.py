@@ -80,7 +80,7 @@ def test_all_records_of_a_world_are_judged_but_the_references(model):
     reference = np.zeros(other.n_records, dtype=int)
     reference[::8] = 1
     other.columns["is_reference"] = reference
-    answers = healthy.answers_of([model], world(), other)
+    answers = healthy.judge_of([model], world()).answers(other)
     assert answers.log_probability.shape == (1, (reference == 0).sum(), 4)
     assert np.isfinite(answers.log_probability).all()
     names = [CLASSES[label] for label in answers.label]
