@@ -206,6 +206,7 @@ class HealthyMachine:
         notes = []
         threshold = self.with_levels.threshold
         share = f"{threshold.false_alarms:.0%}"
+        kind = "mountings" if self.references.is_remounted else "healthy recordings"
         if self.is_one_session:
             notes.append(
                 "one healthy recording shows the time blocks of one session alone: spread between "
@@ -214,12 +215,12 @@ class HealthyMachine:
         elif threshold.is_rank:
             notes.append(
                 f"at most {share} false alarms if this recording is exchangeable with the "
-                f"{threshold.n_held_back} healthy ones"
+                f"{threshold.n_held_back} {kind}"
             )
         else:
             n_known = threshold.n_held_back
             notes.append(
-                f"{n_known} held-back healthy recordings promise no fewer than "
+                f"{n_known} held-back {kind} promise no fewer than "
                 f"{1.0 / (n_known + 1):.0%} false alarms by rank; the limit for {share} assumes a "
                 "distribution of their scores"
             )

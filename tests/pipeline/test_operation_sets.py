@@ -18,7 +18,12 @@ HOWTO = Path(__file__).resolve().parents[2] / "docs" / "howto" / "operation.md"
 BLOCKS = re.findall(
     r"```sh\n(.*?)```", HOWTO.read_text(encoding="utf-8"), flags=re.DOTALL
 )
-SMALLER = {"plan.n_records=40": "plan.n_records=4", "plan.n_units=10": "plan.n_units=1"}
+SMALLER = {
+    "plan.n_records=40": "plan.n_records=4",
+    "plan.n_units=10": "plan.n_units=1",
+    "operating.duration_s=6": "operating.duration_s=2",
+    "operating.duration_s=12": "operating.duration_s=6",
+}
 
 
 @pytest.fixture(scope="module")

@@ -72,6 +72,8 @@ def test_a_remounted_sensor_looks_changed_until_mountings_are_shown(machine):
         SPEED,
         mounting=[Box().record(30 + n, path=housing(10 + n)) for n in range(4)],
     )
+    # a recording of a new mounting is like the mountings, not like those mounted as before
+    assert taught.with_levels.threshold.n_held_back == 4
     assert taught.judge(Box().record(10, path=new)).score < 0.5 * finding.score
     assert not taught.judge(Box().record(10, path=new)).is_changed
 

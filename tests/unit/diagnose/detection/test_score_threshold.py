@@ -26,3 +26,12 @@ def test_few_scores_that_scatter_raise_the_threshold():
     scattered = threshold_of([0.6, 1.3, 2.9], 0.05)
     assert scattered.value > 1.3 * steady.value
     assert threshold_of([], 0.05).value > threshold_of([], 0.2).value
+
+
+def test_two_recordings_are_one_distance():
+    """Held back against each other they have nearly one score, which says nothing of scatter."""
+    usual = float(np.exp(PRIOR_MEAN))
+    none, one, two, three = (threshold_of([usual] * n, 0.05).value for n in range(4))
+    assert none == one > two > three
+    # the scatter is that assumed: a normal quantile above the mean at the least
+    assert two > usual * np.exp(1.645 * PRIOR_DEVIATION)
