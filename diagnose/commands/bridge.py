@@ -30,6 +30,7 @@ EXAMPLE = """\
 examples:
   diagnose bridge --on mcc5_thu downloads/mcc5_thu --data runs/residuals --out runs/bridge
   diagnose bridge --on rig/measured.yaml --data runs/residuals --out runs/bridge"""
+OPTION = "measured_machine"  # no experiment of gensig has this name
 FAULTS = "healthy,crack,broken,missing_tooth,distributed_pitting"
 
 
@@ -109,9 +110,9 @@ def source_lines(machine: BridgeMachine) -> list[str]:
     teeth = " ".join(map(str, machine.teeth))
     speed = 60.0 * max(one.shaft_frequency for one in machine.healthy)
     return [
-        f"gensig new gearbox bridge --teeth {teeth} --module 2 --speed {speed:g} --torque 20 "
+        f"gensig new gearbox {OPTION} --teeth {teeth} --module 2 --speed {speed:g} --torque 20 "
         "--no-level",
-        f"gensig generate experiment=bridge plan.classes=[{FAULTS}] plan.n_reference=0 "
+        f"gensig generate experiment={OPTION} plan.classes=[{FAULTS}] plan.n_reference=0 "
         "sensing.snr_db=null dataset.store_healthy_twin=true out=runs/residuals",
     ]
 

@@ -1,5 +1,6 @@
 """A machine of a measured set for the bridge: what is used, what is left out, what is refused."""
 
+import shlex
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,11 @@ from diagnose.bridge.bridge_machine import NO_LABEL, VARYING, bridge_machine
 from diagnose.bridge.implanted_windows import wrong_teeth
 from diagnose.bridge.protocol import FROZEN, BridgeProtocol
 from diagnose.cli import main
+from diagnose.commands.bridge import source_lines
+from gensig.cli import main as gensig_main
+from gensig.dataset.reader import open_dataset
 from gensig.errors import ConfigError
+from gensig.implants.simulated_pairs import SimulatedPairs
 from gensig.measured import load
 from gensig.measured.measured_set import GearTrain
 
@@ -85,8 +90,24 @@ def test_without_data_the_command_says_how_to_make_them(tmp_path, capsys) -> Non
     write_rig(tmp_path)
     assert main(["bridge", "--on", str(tmp_path / "measured.yaml")]) == 0
     text = capsys.readouterr().out
-    assert "gensig new gearbox bridge --teeth 20 40 " in text
+    assert "gensig new gearbox measured_machine --teeth 20 40 " in text
     assert "dataset.store_healthy_twin=true" in text
+
+
+@pytest.mark.parametrize("teeth", ["[20, 40]", "[32, 80], [48, 64]"])
+def test_the_commands_that_make_them_work(teeth, tmp_path, monkeypatch) -> None:
+    write_rig(tmp_path, n_repeats=1)
+    yaml = tmp_path / "measured.yaml"
+    yaml.write_text(yaml.read_text().replace("[20, 40]", teeth))
+    machine = bridge_machine(load(None, yaml), FROZEN)
+    new, generate = (shlex.split(line)[1:] for line in source_lines(machine))
+    monkeypatch.chdir(tmp_path)
+    assert gensig_main(new) == 0
+    few = ["plan.n_records=5", "plan.n_units=1", "executor.n_workers=1"]
+    assert gensig_main([*generate, "operating.duration_s=0.1", *few]) == 0
+    with open_dataset(tmp_path / "runs" / "residuals") as data:
+        pairs = SimulatedPairs(data)
+    assert sorted(set(pairs.label.tolist()) - {-1}) == [0, 1, 2]
 
 
 @pytest.mark.parametrize(
