@@ -237,7 +237,7 @@ def implant(
     n_records: int = 600,
     duration_s: float | None = None,
     held_out: float = 0.25,
-    plain_healthy: float = 0.0,
+    plain_healthy: float = 0.5,
     seed: int = 0,
 ) -> Dataset:
     """Make a data set of healthy recordings plus residuals of simulated faults, and open it.

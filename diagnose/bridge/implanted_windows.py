@@ -97,6 +97,7 @@ def implanted(
     seconds = window_seconds(machine, protocol)
     options = ImplantOptions(
         gain_db=protocol.gain_db,
+        plain_healthy=protocol.plain_healthy,
         path=protocol.path,
         residual=residual,
         n_records=protocol.n_records,

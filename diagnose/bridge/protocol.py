@@ -21,6 +21,7 @@ class BridgeProtocol:
     most_seconds : s    of a recording that are used, from its begin
     held_out : share of the time blocks of each healthy recording, its last ones, that carry nothing
     gain_db : dB    ends of the uniform law of a residual's level over the carrier's
+    plain_healthy : share of the healthy implants without a residual
     path : "none" or "twin", see `gensig.implants.options.ImplantOptions`
     n_records : implanted records of a training
     validation_every : one in so many carrying blocks is for early stopping
@@ -38,6 +39,7 @@ class BridgeProtocol:
     most_seconds: float = 20.0
     held_out: float = 0.25
     gain_db: tuple[float, float] = (-10.0, 10.0)
+    plain_healthy: float = 0.5
     path: str = "none"
     n_records: int = 600
     validation_every: int = 5
@@ -72,6 +74,10 @@ class BridgeProtocol:
                 "gain",
                 f"{low:g} to {high:g} dB over the carrier's RMS, for every class alike",
             ),
+            (
+                "healthy implants",
+                f"{self.plain_healthy:.0%} of them without a residual",
+            ),
             ("path", f"{self.path}"),
             ("network", f"cnn, windows normalised by {self.normalise}"),
             (
@@ -88,4 +94,4 @@ class BridgeProtocol:
         ]
 
 
-FROZEN = BridgeProtocol(version=1)
+FROZEN = BridgeProtocol(version=2)

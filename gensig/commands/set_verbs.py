@@ -184,8 +184,8 @@ IMPLANT = (
     number(
         "--plain-healthy",
         "SHARE",
-        "of the healthy records that carry nothing (default: 0)",
-        default=0.0,
+        "of the healthy records that carry nothing (default: 0.5)",
+        default=0.5,
     ),
     count("--seed", "N", "of what is drawn (default: 0)", default=0),
     QUIET,

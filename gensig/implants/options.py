@@ -38,7 +38,7 @@ class ImplantOptions:
     n_records: int = 600
     duration: float | None = None
     held_out: float = 0.25
-    plain_healthy: float = 0.0
+    plain_healthy: float = 0.5
     seed: int = 0
 
     def __post_init__(self) -> None:

@@ -74,7 +74,10 @@ def test_the_set_is_whole_and_opens(made):
         one = data.where(fault="one_tooth", carrier_file="day0.npz")
         assert 0 < len(one) < 18  # of both days
         gains = data.column("params/implant_gain_db")
-        assert -10 <= gains.min() < gains.max() <= 10
+        assert -10 <= np.nanmin(gains) < np.nanmax(gains) <= 10
+        is_plain = np.isnan(gains)
+        assert set(data.column("label_name")[is_plain]) == {"healthy"}
+        assert 0 < is_plain.sum() < (data.column("label_name") == "healthy").sum()
         blocks = read_blocks(data)
     recording = recording_of(read_file(str(made / "day0.npz")))
     with pytest.raises(DatasetError, match=r"carried implants"):

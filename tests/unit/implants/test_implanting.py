@@ -13,7 +13,7 @@ from gensig.implants.options import RESIDUALS, ImplantOptions
 from gensig.implants.simulated_pairs import CLASSES, HEALTHY, MANY_TEETH, ONE_TOOTH
 from gensig.signals.indicators import kurtosis
 
-SMALL = ImplantOptions(n_records=72, path="none", duration=0.45)
+SMALL = ImplantOptions(n_records=72, path="none", duration=0.45, plain_healthy=0.0)
 
 
 def implanter(pairs, recordings, teeth=CARRIER_TEETH, speed=900.0, **choices):
@@ -56,7 +56,9 @@ def test_every_class_gets_the_level_that_was_drawn(pairs, healthy, residual, pat
 
 
 def test_a_share_of_the_healthy_records_carries_nothing(pairs, healthy):
-    made = implanter(pairs, healthy, n_records=900, plain_healthy=0.5)
+    made = implanter(
+        pairs, healthy, n_records=900, plain_healthy=ImplantOptions().plain_healthy
+    )
     plain = {draw.name: [] for draw in made.plan.draws}
     for draw in made.plan.draws:
         plain[draw.name].append(np.isnan(draw.gain_db))

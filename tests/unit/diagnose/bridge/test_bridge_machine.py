@@ -131,11 +131,11 @@ def test_words_that_are_wrong_end_with_status_2(
     assert not (tmp_path / "out").exists()
 
 
-def test_the_frozen_protocol_is_version_1() -> None:
+def test_the_frozen_protocol_is_version_2() -> None:
     """Whoever changes a number gives the next version."""
-    assert BridgeProtocol(version=1) == FROZEN
+    assert BridgeProtocol(version=2) == FROZEN
     rows = dict(FROZEN.rows())
-    assert rows["version"] == "1"
+    assert rows["version"] == "2"
     assert len(rows) == len(FROZEN.rows())
 
 
