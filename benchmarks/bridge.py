@@ -69,6 +69,7 @@ WITH_HEALTHY = {
     "many machines, re-drawn": ("separate", NEW, REDRAWN_LESS),
     "many hard machines, re-drawn": ("separate_machines", NEW, REDRAWN_LESS),
 }
+NETWORKS = (*WITH_HEALTHY, PLAIN)
 TOLD = (
     "cpu_model",
     "python",
@@ -104,7 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _judged(folder: Path, options: argparse.Namespace) -> dict[str, Any]:
     """All parts of the benchmark; with other classes those of the worlds alone."""
     classes = options.classes.split(",") if options.classes else []
-    chosen = options.networks or list(WITH_HEALTHY)
+    chosen = options.networks or NETWORKS
     networks = networks_with_healthy(folder, classes, chosen, options.model)
     result = {"with_healthy": judge_worlds(folder, classes, networks)}
     if not classes and not options.model and not options.networks:
@@ -124,23 +125,20 @@ def networks_with_healthy(
     ----------
     folder : of data sets and models
     classes : of all sets, in place of theirs
-    chosen : names of `WITH_HEALTHY`; all of them bring the network without healthy records
+    chosen : names of `NETWORKS`
     further : networks to judge beside those, each as ``NAME=MODEL=DATA``
     """
     mark = _mark(classes)
     result: dict[str, healthy.Judge] = {}
     for name in chosen:
-        set_name, protocol, own = WITH_HEALTHY[name]
+        set_name, protocol, own = WITH_HEALTHY.get(name, ("source", ALONE, ()))
+        target, words = folder / f"{_file_name(name)}{mark}", (*COMPARED, *own)
+        if name == PLAIN:
+            words = ()
         data = folder / f"{set_name}{mark}"
         opened = worlds.open_world(data, SETS[set_name], classes)
-        target = folder / f"{_file_name(name)}{mark}"
-        models = trained(target, data, *COMPARED, *own, protocol=protocol)
+        models = trained(target, data, *words, protocol=protocol)
         result[name] = healthy.judge_of(models, opened)
-    if len(chosen) == len(WITH_HEALTHY):
-        data = folder / f"source{mark}"
-        models = trained(folder / f"model{mark}", data)
-        opened = worlds.open_world(data, worlds.SOURCE, classes)
-        result[PLAIN] = healthy.judge_of(models, opened)
     for text in further:
         name, model, place = text.split("=", 2)
         result[name] = healthy.judge_of([Path(model)], gensig.open_dataset(place))
@@ -302,7 +300,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--networks",
         nargs="+",
-        choices=list(WITH_HEALTHY),
+        choices=NETWORKS,
         help="train and judge these alone",
     )
     parser.add_argument(

@@ -205,6 +205,7 @@ def arms(
     choices = [("twin", kind, 0.0) for kind in KINDS]
     choices += [("none", "physics", 0.0)]
     choices += [("twin", kind, PLAIN_HEALTHY) for kind in KINDS[:3]]
+    choices += [("none", "physics", PLAIN_HEALTHY)]
     laws = [(*choice, USUAL_GAIN) for choice in choices]
     laws += [("twin", "physics", PLAIN_HEALTHY, WIDE_GAIN)]
     for path, kind, plain, gain in laws:
