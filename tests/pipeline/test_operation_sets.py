@@ -22,7 +22,6 @@ SMALLER = {
     "plan.n_records=40": "plan.n_records=4",
     "plan.n_units=10": "plan.n_units=1",
     "operating.duration_s=6": "operating.duration_s=2",
-    "operating.duration_s=12": "operating.duration_s=6",
 }
 
 

@@ -13,11 +13,10 @@ from diagnose.bridge.protocol import FROZEN, BridgeProtocol
 from diagnose.cli import main
 from diagnose.commands.bridge import source_lines
 from gensig.cli import main as gensig_main
-from gensig.dataset.reader import open_dataset
 from gensig.errors import ConfigError
-from gensig.implants.simulated_pairs import SimulatedPairs
 from gensig.measured import load
 from gensig.measured.measured_set import GearTrain
+from gensig.plan.request import read_request
 
 
 def test_healthy_and_faulty_are_told_apart(tmp_path) -> None:
@@ -103,11 +102,11 @@ def test_the_commands_that_make_them_work(teeth, tmp_path, monkeypatch) -> None:
     new, generate = (shlex.split(line)[1:] for line in source_lines(machine))
     monkeypatch.chdir(tmp_path)
     assert gensig_main(new) == 0
-    few = ["plan.n_records=5", "plan.n_units=1", "executor.n_workers=1"]
-    assert gensig_main([*generate, "operating.duration_s=0.1", *few]) == 0
-    with open_dataset(tmp_path / "runs" / "residuals") as data:
-        pairs = SimulatedPairs(data)
-    assert sorted(set(pairs.label.tolist()) - {-1}) == [0, 1, 2]
+    assert generate[0] == "generate"
+    assert gensig_main(["plan", *generate[1:]]) == 0
+    config = read_request(generate[1:]).config
+    assert config["dataset"]["store_healthy_twin"]
+    assert config["sensing"]["snr_db"] is None
 
 
 @pytest.mark.parametrize(
