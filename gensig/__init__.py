@@ -271,10 +271,12 @@ def implant(
     ------
     gensig.errors.GensigError    for anything that cannot be used
     """
-    from gensig.implants.gearing import Gearing
-    from gensig.implants.implant_folder import write_implants
-    from gensig.implants.implanting import Implanter, speeds_of, taken_recordings
+    from gensig.errors import SimulationError
+    from gensig.implants.implant_folder import HERE, begin_implants
+    from gensig.implants.implant_sources import ImplantSources, open_implanter
+    from gensig.implants.implanting import speeds_of
     from gensig.implants.options import ImplantOptions
+    from gensig.production.folder import run_folder
 
     options = ImplantOptions(
         gain_db=gain_db,
@@ -286,13 +288,19 @@ def implant(
         plain_healthy=plain_healthy,
         seed=seed,
     )
-    with open_dataset(data) as source:
-        implanter = Implanter(
-            source,
-            taken_recordings(recordings),
-            Gearing(teeth=tuple(teeth)),
-            speeds_of(speed_rpm),
-            options,
+    sources = ImplantSources(
+        data=Path(data),
+        healthy=tuple(recordings),
+        teeth=tuple(teeth),
+        speed_rpm=tuple(speeds_of(speed_rpm)),
+        options=options,
+    )
+    implanter, folder = open_implanter(sources), Path(out)
+    with implanter.pairs.data:
+        maker = begin_implants(folder, implanter, sources)
+        _, problems = run_folder(
+            folder, executor=HERE, on_shard=lambda _: None, maker=maker
         )
-        write_implants(Path(out), implanter, typed=[])
+    if problems:
+        raise SimulationError(f"{out} is incomplete: {problems[0]}")
     return open_dataset(out)

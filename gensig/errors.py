@@ -45,3 +45,7 @@ class Interrupted(KeyboardInterrupt):
 
 class DatasetError(GensigError):
     """A folder or file that is no data set, is damaged, or would be overwritten."""
+
+
+class WriteError(DatasetError):
+    """A file or folder that the disk refuses to take."""

@@ -71,7 +71,7 @@ GENSIG = {
     "execution": "errors options",
     "faults": "errors geometry units",
     "geometry": "errors units",
-    "implants": "dataset errors signals version",
+    "implants": "dataset errors execution production signals version",
     "life": "errors faults geometry material mesh options units",
     "material": "errors units",
     "measured": "errors options signals text",

@@ -1,75 +1,213 @@
-"""A set of implants on disk: a data set like any other, less that nothing simulates it again."""
+"""A set of implants on disk: a data set like any other, made of recordings instead of a plan alone.
+
+Its folder names its sources (`gensig.implants.implant_sources`), so that a run that was killed goes
+on with the bits of an undisturbed one, or says which source is gone.
+"""
 
 from __future__ import annotations
 
+import dataclasses
+import functools
+import hashlib
 import json
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from gensig.dataset.columns import GEAR_NAMES, GEAR_PINION_TURNS, GEAR_TEETH
-from gensig.dataset.folder.beginning import create_folder, refuse_used
-from gensig.dataset.folder.closing import finalize
+from gensig.dataset.folder.beginning import create_folder
 from gensig.dataset.folder.joining import IMPLANTS
-from gensig.dataset.folder.layout import shard_path
-from gensig.dataset.folder.manifest import identity_hash, record_shard
+from gensig.dataset.folder.layout import (
+    OVERRIDES,
+    PLAN,
+    ConfigContent,
+    Manifest,
+    read_config,
+    read_manifest,
+    shard_path,
+)
+from gensig.dataset.folder.manifest import differing_keys, identity_hash
 from gensig.dataset.folder.run_log import log
+from gensig.dataset.plan import Plan, plan_text
 from gensig.dataset.schema import IDENTITY, SCHEMA_VERSION
+from gensig.dataset.storage.atomic import sha256_file
 from gensig.dataset.storage.attributes import Attribute
+from gensig.dataset.storage.guard import same_file
+from gensig.dataset.storage.receipts import write_receipt
 from gensig.dataset.storage.shard import ShardWriter
+from gensig.errors import DatasetError
+from gensig.execution.local import LocalExecutor
 from gensig.implants.blocks import blocks_content
+from gensig.implants.implant_sources import (
+    ImplantSources,
+    open_implanter,
+    read_sources,
+    source_words,
+)
 from gensig.implants.implanting import Implanter
+from gensig.production.maker import SIMULATION, Maker
+from gensig.production.record_counts import RecordCounts
+from gensig.production.shard_writing import WrittenShard
 from gensig.signals.resampling import PASS_SHARE
 from gensig.version import __version__
 
 PARAMS = "params/"
+# blocks are cut and records are made in this process: the implanter is at hand
+HERE = LocalExecutor(n_workers=1)
 
 
-def write_implants(
-    out: Path,
-    implanter: Implanter,
-    *,
-    typed: Sequence[str],
-    tell: Callable[[int, int], None] = lambda done, total: None,
-) -> None:
-    """Write the records of an implanter as a data set, a shard at a time.
-
-    Parameters
-    ----------
-    out : folder that does not exist, or is empty
-    typed : words of the command, for ``overrides.yaml``
-    tell : takes the number of records made, and of all
+def begin_implants(out: Path, implanter: Implanter, sources: ImplantSources) -> Maker:
+    """Make the folder of a set of implants; returns the maker of its shards, for `HERE`.
 
     Raises
     ------
     DatasetError    where ``out`` holds anything, before anything is touched
     """
-    refuse_used(out)
-    plan, options = implanter.plan.table, implanter.options
-    config = configuration(implanter)
-    identity = identity_hash(config, __version__)
+    plan, config = implanter.plan.table, configuration(implanter)
     create_folder(
         out,
         config=config,
-        overrides=typed,
+        overrides=source_words(sources, out),
         plan=plan,
-        identity=identity,
-        seed=options.seed,
+        identity=identity_hash(config, __version__),
+        seed=implanter.options.seed,
         generator_version=__version__,
     )
-    first = 0
-    for shard, n_rows in enumerate(plan.shard_sizes()):
-        writer = _writer(out, implanter, config, identity, shard, n_rows)
-        with writer:
-            for row in range(n_rows):
-                signal = implanter.record(first + row)
-                values = _values(implanter, first + row)
-                writer.write(row, {"acceleration": signal}, values)
-                tell(first + row + 1, plan.n_records)
-        record_shard(out, shard, writer.sha256, writer.n_bytes, writer.n_failed)
-        log(out, f"shard {shard}: {n_rows} records, {writer.n_bytes} bytes")
-        first += n_rows
-    finalize(out)
+    planned = f"{plan.n_records} records in {plan.n_shards} shards are planned"
+    log(out, f"gensig {__version__}: {planned}")
+    return Maker(
+        plan=lambda *_: plan,
+        check=lambda _: None,
+        write=functools.partial(write_implant_shard, implanter=implanter),
+    )
+
+
+def maker_of(out: Path) -> Maker:
+    """The maker of what a folder lacks: by its recordings, or by simulation."""
+    if IMPLANTS in read_config(out):
+        return IMPLANTING
+    return SIMULATION
+
+
+def write_implant_shard(
+    out: Path,
+    shard_index: int,
+    *,
+    counts: RecordCounts | None = None,
+    implanter: Implanter | None = None,
+) -> WrittenShard:
+    """Write one shard; its bits depend on the folder's sources only.
+
+    Parameters
+    ----------
+    counts : takes the records that are written
+    implanter : of the folder; None opens its sources
+
+    Raises
+    ------
+    DatasetError    as `_sources_checked`
+    """
+    implanter = implanter or _implanter(out)
+    sizes = implanter.plan.table.shard_sizes()
+    n_rows, first = sizes[shard_index], sum(sizes[:shard_index])
+    writer = _writer(out, implanter, shard_index, n_rows)
+    with writer:
+        for row in range(n_rows):
+            signal = implanter.record(first + row)
+            values = _values(implanter, first + row)
+            writer.write(row, {"acceleration": signal}, values)
+            if counts is not None:
+                counts.set(shard_index, row + 1)
+    written = WrittenShard(
+        sha256=writer.sha256, n_bytes=writer.n_bytes, n_failed=writer.n_failed
+    )
+    write_receipt(out, shard_index, rows=n_rows, **dataclasses.asdict(written))
+    return written
+
+
+def _implanter(out: Path) -> Implanter:
+    return _opened(out, same_file(out / OVERRIDES))
+
+
+@functools.lru_cache(maxsize=1)
+def _opened(out: Path, _changed: tuple[int, ...]) -> Implanter:
+    """Implanter of the sources that a folder names, opened once for all its shards."""
+    manifest, config = read_manifest(out), read_config(out)
+    sources = _sources_checked(out, manifest, config)
+    implanter = open_implanter(sources)
+    made = configuration(implanter)
+    keys = differing_keys(config, made)
+    if identity_hash(made, __version__) != manifest.identity or keys:
+        raise _other_set(out, f"another {', '.join(keys[:3])}")
+    text = plan_text(implanter.plan.table)
+    if hashlib.sha256(text.encode()).hexdigest() != manifest.files.get(PLAN):
+        raise _other_set(out, f"another {PLAN}")
+    return implanter
+
+
+def _other_set(out: Path, what: str) -> DatasetError:
+    return DatasetError(
+        f"{out}: its sources give {what} here than where it was begun; go on with the libraries "
+        "that its manifest.json names, or give the same `gensig implant` another out=DIR"
+    )
+
+
+def _sources_checked(
+    out: Path, manifest: Manifest, config: ConfigContent
+) -> ImplantSources:
+    """Sources of a folder, none of them gone or altered.
+
+    Raises
+    ------
+    DatasetError    with one line, for the first that is
+    """
+    if manifest.files.get(OVERRIDES) != sha256_file(out / OVERRIDES):
+        raise DatasetError(
+            f"{out / OVERRIDES} was altered, and names the sources; restore it from a copy"
+        )
+    sources = read_sources(out)
+    try:
+        section = config[IMPLANTS]
+        identity = section["source_identity"]
+        digests = [entry["sha256"] for entry in section["recordings"]]
+    except (KeyError, TypeError) as error:
+        raise DatasetError(
+            f"the configuration of {out} names no sources; restore it from a copy"
+        ) from error
+    for file, digest in zip(sources.files or (), digests, strict=False):
+        if not file.is_file():
+            raise DatasetError(
+                f"{file} is gone, a recording that {out} is made of; put it back there, then "
+                f"`gensig resume {out}` goes on"
+            )
+        if sha256_file(file) != digest:
+            raise DatasetError(
+                f"{file} was altered since {out} was begun with it; put the recording back as "
+                "it was, or give the same `gensig implant` another out=DIR"
+            )
+    try:
+        found = read_manifest(sources.data).identity
+    except DatasetError as error:
+        raise DatasetError(
+            f"{sources.data} is gone, the simulated set that {out} is made of; put it back "
+            f"there, then `gensig resume {out}` goes on"
+        ) from error
+    if found != identity:
+        raise DatasetError(
+            f"{sources.data} is another simulated set than {out} was begun with; put that back, "
+            "or give the same `gensig implant` another out=DIR"
+        )
+    return sources
+
+
+def _planned_again(out: Path, _config: ConfigContent) -> Plan:
+    return _implanter(out).plan.table
+
+
+def _check(out: Path) -> None:
+    _implanter(out)
+
+
+IMPLANTING = Maker(plan=_planned_again, check=_check, write=write_implant_shard)
 
 
 def configuration(implanter: Implanter) -> dict[str, Any]:
@@ -111,10 +249,9 @@ def configuration(implanter: Implanter) -> dict[str, Any]:
     }
 
 
-def _attributes(
-    implanter: Implanter, config: dict[str, Any], identity: str
-) -> dict[str, Attribute]:
+def _attributes(implanter: Implanter) -> dict[str, Attribute]:
     """Root attributes of the shards."""
+    config = configuration(implanter)
     gearing, first = implanter.gearing, implanter.carriers[0].recording
     gears: dict[str, Attribute] = {}
     if gearing.n_stages > 1:
@@ -127,7 +264,7 @@ def _attributes(
     return {
         "schema_version": SCHEMA_VERSION,
         "generator_version": __version__,
-        IDENTITY: identity,
+        IDENTITY: identity_hash(config, __version__),
         "sampling_rate_hz": first.sampling_rate,
         "usable_band_hz": [0.0, PASS_SHARE * first.sampling_rate],
         "channel_names": list(first.sensors),
@@ -140,14 +277,7 @@ def _attributes(
     }
 
 
-def _writer(
-    out: Path,
-    implanter: Implanter,
-    config: dict[str, Any],
-    identity: str,
-    shard: int,
-    n_rows: int,
-) -> ShardWriter:
+def _writer(out: Path, implanter: Implanter, shard: int, n_rows: int) -> ShardWriter:
     names = implanter.plan.table.columns
     n_channels = len(implanter.carriers[0].recording.sensors)
     return ShardWriter(
@@ -155,7 +285,7 @@ def _writer(
         n_records=n_rows,
         signals={"acceleration": (n_channels, implanter.cut.n_samples)},
         params=[name.removeprefix(PARAMS) for name in names if name.startswith(PARAMS)],
-        attributes=_attributes(implanter, config, identity),
+        attributes=_attributes(implanter),
         shard_index=shard,
     )
 

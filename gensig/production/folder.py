@@ -38,6 +38,7 @@ from gensig.errors import ConfigError
 from gensig.execution.base import Executor, ShardFailure
 from gensig.options.configuration import Configuration
 from gensig.plan.make import make_plan
+from gensig.production.maker import SIMULATION, Maker
 from gensig.production.record_counts import RecordCounts
 from gensig.production.restoring import restore_index, restore_tables
 from gensig.production.run_check import (
@@ -47,7 +48,7 @@ from gensig.production.run_check import (
     require_whole,
     shard_entries,
 )
-from gensig.production.shard_writing import WrittenShard, write_shard
+from gensig.production.shard_writing import WrittenShard
 from gensig.record.options import (
     read_dataset_options,
 )
@@ -112,6 +113,7 @@ def run_folder(
     on_shard: Callable[[Progress], None],
     asked: Configuration | None = None,
     counts: RecordCounts | None = None,
+    maker: Maker = SIMULATION,
 ) -> tuple[int, list[str]]:
     """Make the shards that a folder still lacks, then close it.
 
@@ -123,6 +125,7 @@ def run_folder(
     on_shard : called at the beginning, and for every shard that is finished or could not be made
     counts : takes the records of shards at work
     asked : a configuration that must agree with the folder's in all that decides bits
+    maker : of the plan and the shards that are missing
 
     Returns
     -------
@@ -131,17 +134,20 @@ def run_folder(
     """
     out = out.resolve()
     with folder_kept(out), at_work(out / SHARDS, others=not executor.closes):
-        _join(out, asked, closes=executor.closes)
-        return _run_shards(out, executor, on_shard, counts)
+        _join(out, asked, maker, closes=executor.closes)
+        return _run_shards(out, executor, on_shard, counts, maker)
 
 
-def _join(out: Path, asked: Configuration | None, *, closes: bool) -> None:
+def _join(
+    out: Path, asked: Configuration | None, maker: Maker, *, closes: bool
+) -> None:
     """Refuse a folder of another version or configuration; restore lost tables of one to close."""
     plain = None
     if asked is not None:
         plain = asked.plain()
     if closes:
-        restore_tables(out, *agreed_folder(out, asked=plain))
+        manifest, config = agreed_folder(out, asked=plain)
+        restore_tables(out, manifest, lambda: maker.plan(out, config))
     joined_folder(out, asked=plain)
     if closes:
         collect_receipts(out)
@@ -155,6 +161,7 @@ def _run_shards(
     executor: Executor,
     on_shard: Callable[[Progress], None],
     counts: RecordCounts | None,
+    maker: Maker,
 ) -> tuple[int, list[str]]:
     """See `run_folder`."""
     manifest = read_manifest(out)
@@ -162,6 +169,8 @@ def _run_shards(
     mine = executor.share(range(len(rows)))
     entries = shard_entries(out, mine)
     missing = [index for index in mine if not _is_there(out, index, entries[index])]
+    if missing:
+        maker.check(out)
     done = [index for index in mine if index not in missing]
     tally = _Tally(
         n_records=sum(rows[index] for index in mine),
@@ -176,7 +185,7 @@ def _run_shards(
         n_missing = f"{len(missing)} of {len(mine)} shards to make"
         log(out, f"gensig {__version__}, {executor}: {n_missing}")
     on_shard(tally.progress())
-    job = functools.partial(write_shard, out, counts=counts)
+    job = functools.partial(maker.write, out, counts=counts)
     try:
         for index, result in executor.run(job, missing):
             if counts is not None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gensig.dataset.folder.environment import environment
 from gensig.dataset.folder.failures import without_numbers
-from gensig.dataset.folder.joining import joined_folder
+from gensig.dataset.folder.joining import joined_folder, refuse_implants
 from gensig.dataset.folder.layout import PLAN, Manifest, shard_path
 from gensig.dataset.plan import Plan, read_plan
 from gensig.dataset.schema import SCALES, stored_reason
@@ -154,6 +154,7 @@ def simulate_twin(config: Configuration, row: Mapping[str, Any]) -> Record:
 
 def _finished(folder: Path) -> tuple[Manifest, Configuration, Plan]:
     manifest, config = joined_folder(folder)
+    refuse_implants(folder, config)
     if not manifest.is_complete:
         raise DatasetError(
             f"{folder} is incomplete; run `gensig resume {folder}` first"

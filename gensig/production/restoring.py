@@ -11,25 +11,25 @@ from gensig.dataset.folder.layout import (
     PLAN,
     SHARDS,
     SPLITS,
-    ConfigContent,
     Manifest,
 )
-from gensig.dataset.plan import plan_text, read_plan
+from gensig.dataset.plan import Plan, plan_text, read_plan
 from gensig.dataset.splitting.protocols import make_splits
 from gensig.dataset.storage.atomic import write_text
 from gensig.dataset.storage.index import write_index
 from gensig.errors import DatasetError
-from gensig.options.configuration import Configuration
-from gensig.plan.make import make_plan
 
 
-def restore_tables(out: Path, manifest: Manifest, config: ConfigContent) -> list[str]:
+def restore_tables(
+    out: Path, manifest: Manifest, make: Callable[[], Plan]
+) -> list[str]:
     """Make the plan and the splits again that a folder lacks; returns their names.
 
     Parameters
     ----------
     out : folder of a data set
-    manifest, config : its manifest and configuration, which belong together
+    manifest : its manifest
+    make : makes its plan
 
     Raises
     ------
@@ -43,9 +43,7 @@ def restore_tables(out: Path, manifest: Manifest, config: ConfigContent) -> list
     for folder in (SHARDS, SPLITS):
         (out / folder).mkdir(exist_ok=True)
     if PLAN in lost:
-        _restore(
-            out, manifest, PLAN, lambda: plan_text(make_plan(Configuration(config)))
-        )
+        _restore(out, manifest, PLAN, lambda: plan_text(make()))
     splits = [name for name in lost if name.startswith(f"{SPLITS}/")]
     if splits:
         plan = read_plan(out / PLAN, sha256=manifest.files.get(PLAN))

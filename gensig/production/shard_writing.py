@@ -13,7 +13,7 @@ from typing import Any
 
 from gensig.compilation import on_compilation
 from gensig.dataset.columns import GEAR_NAMES, GEAR_PINION_TURNS, GEAR_TEETH
-from gensig.dataset.folder.joining import joined_folder
+from gensig.dataset.folder.joining import joined_folder, refuse_implants
 from gensig.dataset.folder.layout import (
     PLAN,
     Manifest,
@@ -116,6 +116,7 @@ def _folder_inputs(
 ) -> tuple[Configuration, PlanRows, Manifest]:
     """Configuration, plan and manifest at its beginning, read once for many shards of a folder."""
     manifest, config = joined_folder(out)
+    refuse_implants(out, config)
     return Configuration(config), PlanRows(out / PLAN), manifest
 
 

@@ -98,7 +98,7 @@ def write_report(
             f"the page would have {len(content) / 1e6:.1f} MB, at most 15 are meant; "
             "give fewer --records"
         )
-    write_bytes(path, content)
+    write_bytes(path, content, instead="choose another --out FILE")
     return path, f"{summary}, {len(content) / 1e6:.1f} MB"
 
 

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import shlex
 import time
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gensig.commands.console import note, remark, step
+from gensig.commands.console import note, step
 from gensig.commands.sets.jobs import Job, read_jobs, typed_words
+from gensig.commands.sets.running import print_failed, run
 from gensig.dataset.folder.beginning import config_text, refuse_used
-from gensig.dataset.folder.failures import commonest, failure_reasons
 from gensig.dataset.folder.joining import joined_folder
 from gensig.dataset.folder.layout import MANIFEST, read_overrides
 from gensig.dataset.folder.manifest import read_manifest
 from gensig.dataset.folder.quick_check import absences
-from gensig.errors import ConfigError, Interrupted
+from gensig.errors import ConfigError
 from gensig.options.compose import override_keys
 from gensig.options.configuration import Configuration
 from gensig.plan.request import STORED_FLAG, Request, read_request
-from gensig.terminal.run_progress import RunProgress
 
 if TYPE_CHECKING:
     from gensig.dataset.plan import Plan
@@ -76,7 +74,7 @@ def _generate(
         note(*request.notes, *plan_notes(request.config, table))
         note(*plan_doubts(request.config, table))
         step(f"{out}: making {n_records} records in {n_shards} shard(s)")
-    return _run(
+    return run(
         out,
         executor,
         arguments,
@@ -97,7 +95,7 @@ def _generate_share(executor: Executor, arguments: Namespace) -> int:
     begin = time.monotonic()
     manifest = read_manifest(out)
     mine = executor.share(range(len(manifest.shards)))
-    return _run(
+    return run(
         out,
         executor,
         arguments,
@@ -106,59 +104,6 @@ def _generate_share(executor: Executor, arguments: Namespace) -> int:
         asked=_asked(out, words, arguments.config_dir, arguments.config),
         of_task=True,
     )
-
-
-def _run(
-    out: Path,
-    executor: Executor,
-    arguments: Namespace,
-    *,
-    n_records: int,
-    begin: float,
-    asked: Configuration | None = None,
-    of_task: bool = False,
-) -> int:
-    """Make the shards that a folder, or a task's share of it, lacks; returns the exit status."""
-    from gensig.production.folder import run_folder
-    from gensig.production.record_counts import record_counts
-
-    folder = shlex.quote(str(out))
-    advice = (
-        f"{out} is incomplete; gensig resume {folder} tries the missing shards again"
-    )
-    records = f"{n_records} records"
-    following = f"gensig inspect {folder} describes them"
-    going_on = f"and gensig resume {folder} finishes it"
-    if of_task:
-        going_on = "and the same command goes on with this task's share"
-        advice = "this task's share is incomplete; the same command tries again"
-        records += " of this task"
-        following = f"gensig finalize {folder}"
-    with record_counts(len(read_manifest(out).shards)) as counts:
-        progress = RunProgress(
-            quiet=arguments.quiet, n_records=n_records, counts=counts
-        )
-        try:
-            with progress:
-                n_failed, problems = run_folder(
-                    out,
-                    executor=executor,
-                    on_shard=progress,
-                    asked=asked,
-                    counts=counts,
-                )
-        except KeyboardInterrupt:
-            raise Interrupted(f"interrupted; {out} is incomplete, {going_on}") from None
-    for problem in problems:
-        remark(problem)
-    if problems:
-        remark(advice)
-        return 1
-    _print_failed(out, n_failed, n_records)
-    if not arguments.quiet:
-        print(f"{out}: {records} in {time.monotonic() - begin:.1f} s; {following}")
-    # A task of an array job has done its work; finalize answers for the whole folder.
-    return int(n_failed > 0 and not of_task)
 
 
 def _asked(
@@ -219,7 +164,7 @@ def resume(arguments: Namespace) -> int:
         if asked is not None:
             joined_folder(out, asked=asked.plain())
         return _print_complete(out, manifest.n_failed, manifest.n_records)
-    return _run(
+    return run(
         out,
         executor,
         arguments,
@@ -248,19 +193,9 @@ def finalize(arguments: Namespace) -> int:
 
 def _print_complete(out: Path, n_failed: int, n_records: int) -> int:
     """Print that a folder is complete, and return its exit status."""
-    _print_failed(out, n_failed, n_records)
+    print_failed(out, n_failed, n_records)
     print(f"{out} is complete: {n_records} records")
     return int(n_failed > 0)
-
-
-def _print_failed(out: Path, n_failed: int, n_records: int) -> None:
-    if not n_failed:
-        return
-    text = f"{n_failed} of {n_records} records failed and are marked so in {out}"
-    reasons = failure_reasons(out)
-    if reasons:
-        text += f": {commonest(reasons)}"
-    remark(text)
 
 
 def plan(arguments: Namespace) -> int:

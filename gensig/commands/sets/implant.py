@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+import time
 from argparse import Namespace
-from collections.abc import Callable
 from pathlib import Path
 
 from gensig.commands.console import step
+from gensig.commands.sets.running import run
 from gensig.dataset.folder.beginning import refuse_used
-from gensig.dataset.reader import open_dataset
 from gensig.errors import ConfigError
 from gensig.implants.blocks import Block
-from gensig.implants.gearing import Gearing
-from gensig.implants.implant_folder import write_implants
-from gensig.implants.implanting import Implanter, taken_recordings
+from gensig.implants.implant_folder import HERE, begin_implants
+from gensig.implants.implant_sources import ImplantSources, open_implanter
+from gensig.implants.implanting import Implanter
 from gensig.implants.options import ImplantOptions
-from gensig.terminal.run_progress import Progress, RunProgress
 
 OUT_WORD = "out="
 NEEDED = {"healthy": "--healthy", "teeth": "--teeth", "speed_rpm": "--speed-rpm"}
@@ -31,6 +30,25 @@ def implant(arguments: Namespace) -> int:
             )
     out = _out(arguments)
     refuse_used(out)
+    begin = time.monotonic()
+    sources = _sources(arguments)
+    n_records = sources.options.n_records
+    implanter = open_implanter(sources)
+    with implanter.pairs.data:
+        if not arguments.quiet:
+            step(_made_of(implanter))
+        maker = begin_implants(out, implanter, sources)
+        status = run(
+            out, HERE, arguments, n_records=n_records, begin=begin, maker=maker
+        )
+    if not (arguments.quiet or status):
+        for line in held_out_lines(implanter.cut.blocks):
+            print(line)
+    return status
+
+
+def _sources(arguments: Namespace) -> ImplantSources:
+    files = [word for word in arguments.healthy if not word.startswith(OUT_WORD)]
     low, high = arguments.gain_db or GAIN_DB
     options = ImplantOptions(
         gain_db=(low, high),
@@ -42,40 +60,20 @@ def implant(arguments: Namespace) -> int:
         plain_healthy=arguments.plain_healthy,
         seed=arguments.seed,
     )
-    gearing = Gearing(teeth=tuple(arguments.teeth))
-    files = [word for word in arguments.healthy if not word.startswith(OUT_WORD)]
-    with open_dataset(Path(arguments.folder).expanduser()) as data:
-        recordings = taken_recordings(
-            files,
-            sampling_rate=arguments.sampling_rate,
-            channels=arguments.channels,
-            unit=arguments.unit,
-            array=arguments.array,
-            tacho=arguments.tacho,
-        )
-        implanter = Implanter(
-            data,
-            recordings,
-            gearing,
-            arguments.speed_rpm,
-            options,
-            pulses_per_turn=arguments.pulses_per_turn,
-        )
-        if not arguments.quiet:
-            step(_made_of(implanter))
-        with RunProgress(
-            quiet=arguments.quiet, n_records=options.n_records
-        ) as progress:
-            write_implants(
-                out, implanter, typed=_typed(arguments), tell=_shown(progress)
-            )
-    if not arguments.quiet:
-        print(
-            f"{out}: {options.n_records} records; gensig inspect {out} describes them"
-        )
-        for line in held_out_lines(implanter.cut.blocks):
-            print(line)
-    return 0
+    channels = arguments.channels
+    return ImplantSources(
+        data=Path(arguments.folder),
+        healthy=files,
+        teeth=tuple(arguments.teeth),
+        speed_rpm=tuple(arguments.speed_rpm),
+        options=options,
+        sampling_rate=arguments.sampling_rate,
+        channels=None if channels is None else tuple(channels),
+        unit=arguments.unit,
+        array=arguments.array,
+        tacho=arguments.tacho,
+        pulses_per_turn=arguments.pulses_per_turn,
+    )
 
 
 def held_out_lines(blocks: tuple[Block, ...]) -> list[str]:
@@ -88,21 +86,6 @@ def held_out_lines(blocks: tuple[Block, ...]) -> list[str]:
         f"held out, for scores: {file} samples {held[0].start} to {held[-1].stop}"
         for file, held in parts.items()
     ]
-
-
-def _shown(progress: RunProgress) -> Callable[[int, int], None]:
-    def show(n_done: int, n_records: int) -> None:
-        state = Progress(
-            n_done=n_done,
-            n_records=n_records,
-            n_failed=0,
-            n_made=n_done,
-            n_bytes=0,
-            reason="",
-        )
-        progress(state)
-
-    return show
 
 
 def _made_of(implanter: Implanter) -> str:
@@ -132,10 +115,3 @@ def _out(arguments: Namespace) -> Path:
             "out is required, once: give out=DIR, a folder that does not exist or is empty"
         )
     return Path(folders[0]).expanduser()
-
-
-def _typed(arguments: Namespace) -> list[str]:
-    """Words of the command that decide the set, without folders."""
-    taken = vars(arguments)
-    names = ("teeth", "speed_rpm", "gain_db", "path", "residual", "records", "seed")
-    return [f"{name}={taken[name]}" for name in names if taken[name] is not None]

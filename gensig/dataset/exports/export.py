@@ -7,6 +7,7 @@ import csv
 import re
 import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import h5py
@@ -110,7 +111,10 @@ def export(
         finally:
             if temporary.is_dir():
                 shutil.rmtree(temporary, ignore_errors=True)
-            temporary.unlink(missing_ok=True)
+            with suppress(
+                OSError
+            ):  # a read-only disk refuses it even where there is none
+                temporary.unlink(missing_ok=True)
         files = list(_files_of(out))
         return {
             "records": _n_records(data, to, splits),

@@ -2,7 +2,6 @@
 
 import hashlib
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 
 import yaml
@@ -11,6 +10,7 @@ from gensig.dataset.folder.environment import environment
 from gensig.dataset.folder.layout import (
     BEGINNING,
     CONFIG,
+    MANIFEST,
     OVERRIDES,
     PLAN,
     SHARDS,
@@ -32,6 +32,7 @@ from gensig.dataset.storage.atomic import (
     locked,
     write_text,
 )
+from gensig.dataset.storage.made_together import made_together, remove
 from gensig.errors import DatasetError
 
 
@@ -95,29 +96,22 @@ def create_folder(
         configuration=deciding(config),
         environment=environment(),
     )
-    made: list[Path] = []
     try:
-        refuse_used(out)
-        folders = (*reversed(out.parents), out)
-        _make_folders([folder for folder in folders if not folder.exists()], made)
-        with locked(out):
-            refuse_used(out)  # another process may have been faster
-            _clear(out)
-            for name, text in (note | texts).items():
-                made.append(out / name)
-                if not (out / name).parent.exists():
-                    _make_folders([(out / name).parent], made)
-                write_text(out / name, text)
-            _make_folders([out / SHARDS], made)
-            write_manifest(out, manifest)
-            (out / BEGINNING).unlink()
-    except BaseException as error:
-        for path in reversed(made):
-            with suppress(OSError):
-                _remove(path)
-        if isinstance(error, OSError):
-            raise cannot_write(out, error) from error
-        raise
+        with made_together() as made:
+            refuse_used(out)
+            made.folder(out)
+            with locked(out):
+                refuse_used(out)  # another process may have been faster
+                _clear(out)
+                for name, text in (note | texts).items():
+                    made.folder((out / name).parent)
+                    write_text(made.file(out / name), text)
+                made.folder(out / SHARDS)
+                made.file(out / MANIFEST)
+                write_manifest(out, manifest)
+                (out / BEGINNING).unlink()
+    except OSError as error:
+        raise cannot_write(out, error) from error
 
 
 def config_text(config: ConfigContent) -> str:
@@ -154,13 +148,6 @@ def _contents(out: Path) -> str:
     )
 
 
-def _make_folders(folders: Sequence[Path], made: list[Path]) -> None:
-    for folder in folders:
-        with suppress(FileExistsError):  # another process made it meanwhile
-            folder.mkdir()
-            made.append(folder)
-
-
 def _is_killed_beginning(out: Path) -> bool:
     """True for a folder with the note of `create_folder` and files from before its manifest."""
     names = {path.name for path in out.iterdir() if not _is_temporary(path)}
@@ -192,14 +179,7 @@ def _clear(out: Path) -> None:
         reverse=True,
     )
     for path in paths:
-        _remove(path)
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        path.rmdir()
-    else:
-        path.unlink(missing_ok=True)
+        remove(path)
 
 
 def _digest(text: str) -> str:

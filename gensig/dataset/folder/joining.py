@@ -61,7 +61,7 @@ def agreed_folder(
     Raises
     ------
     DatasetError    for another version, a configuration that was changed (with the keys that
-                    differ), a set of implants, and a compression whose package is missing
+                    differ), and a compression whose package is missing
     """
     manifest, config = read_manifest(out), read_config(out)
     if manifest.generator_version != __version__:
@@ -83,13 +83,17 @@ def agreed_folder(
             f"{out} was begun with another {_listed(keys)}; leave that out, or start a new "
             "folder: only executor.* may change"
         )
+    creation_options(config["dataset"]["compression"])  # its package may be missing
+    return manifest, config
+
+
+def refuse_implants(out: Path, config: ConfigContent) -> None:
+    """Raise DatasetError for a set of implants, where records are to be simulated."""
     if IMPLANTS in config:
         raise DatasetError(
             f"{out} is made of recordings, which no simulation makes again: `gensig verify` "
             "checks it, the same `gensig implant` into another folder makes it anew"
         )
-    creation_options(config["dataset"]["compression"])  # its package may be missing
-    return manifest, config
 
 
 def _listed(keys: list[str]) -> str:

@@ -180,7 +180,8 @@ def read_manifest(folder: Path) -> Manifest:
         if (folder / BEGINNING).is_file():
             raise DatasetError(
                 f"{folder} holds no record: its run was killed before the plan was on disk; give "
-                f"the same `gensig generate` or `gensig plan --freeze` with out={folder} again"
+                "the same `gensig generate`, `gensig plan --freeze` or `gensig implant` with "
+                f"out={folder} again"
             )
         raise DatasetError(
             f"{folder} is no gensig data set: it has no {MANIFEST}; give the folder that `gensig "

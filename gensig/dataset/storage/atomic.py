@@ -10,9 +10,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from gensig.errors import DatasetError
+from gensig.errors import DatasetError, WriteError
 
 TEMPORARY_SUFFIX = ".tmp"
+INSTEAD = "choose another out=DIR"  # remedy that helps whatever the disk says
 # remedies where the disk refuses to write, by the number of the error
 REMEDIES = {
     errno.ENOSPC: "free some space there",
@@ -117,15 +118,18 @@ def publish(temporary: Path, path: Path) -> None:
     sync_folder(path.parent)
 
 
-def write_text(path: Path, text: str) -> None:
+def write_text(path: Path, text: str, *, instead: str = INSTEAD) -> None:
     """Write or replace a UTF-8 file atomically; DatasetError when the disk refuses."""
-    write_bytes(path, text.encode("utf-8"))
+    write_bytes(path, text.encode("utf-8"), instead=instead)
 
 
-def write_bytes(path: Path, content: bytes | memoryview) -> None:
+def write_bytes(
+    path: Path, content: bytes | memoryview, *, instead: str = INSTEAD
+) -> None:
     """Write or replace a file atomically.
 
-    DatasetError when the disk refuses, after which no part of it is left.
+    DatasetError when the disk refuses, after which no part of it is left. `instead` is the
+    remedy that helps whatever the cause is.
     """
     temporary = temporary_name(path)
     try:
@@ -134,18 +138,17 @@ def write_bytes(path: Path, content: bytes | memoryview) -> None:
         publish(temporary, path)
     except OSError as error:
         if error.errno == errno.ENOENT and not path.parent.is_dir():
-            raise DatasetError(
+            raise WriteError(
                 f"cannot write {path}: its folder is missing, it was deleted or renamed; "
                 "put it back"
             ) from error
-        raise cannot_write(path, error) from error
+        raise cannot_write(path, error, instead=instead) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # a read-only disk refuses it even where there is none
+            temporary.unlink(missing_ok=True)
 
 
-def cannot_write(
-    path: Path, error: Exception, *, instead: str = "choose another out=DIR"
-) -> DatasetError:
+def cannot_write(path: Path, error: Exception, *, instead: str = INSTEAD) -> WriteError:
     """Error of one line with the cause of a refusal to write, and the remedy for that cause.
 
     Parameters
@@ -162,7 +165,7 @@ def cannot_write(
     elif number == errno.ENOENT:
         standing = next(folder for folder in path.absolute().parents if folder.exists())
         reason = f"{standing} takes no new folders or files"
-    return DatasetError(f"cannot write {path}: {reason}; {remedy}")
+    return WriteError(f"cannot write {path}: {reason}; {remedy}")
 
 
 def read_text(path: Path, *, limit: int, follow_links: bool = False) -> str:
