@@ -289,7 +289,7 @@ def close_folder(out: Path) -> int:
     DatasetError    when a shard is missing, which is named, and while a task is at work
     """
     joined_folder(out)
-    with at_work(out / SHARDS, others=False):
+    with folder_kept(out), at_work(out / SHARDS, others=False):
         collect_receipts(out)
         _close(out)
     return read_manifest(out).n_failed

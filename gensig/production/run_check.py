@@ -17,14 +17,17 @@ from gensig.dataset.folder.layout import (
 )
 from gensig.dataset.folder.manifest import file_digests, record_failed_shard
 from gensig.dataset.folder.quick_check import absences, size_problem
-from gensig.dataset.storage.atomic import sha256_file
+from gensig.dataset.storage.atomic import REMEDIES, cannot_write, sha256_file
 from gensig.dataset.storage.receipts import read_receipt, receipt_path
-from gensig.errors import DatasetError
+from gensig.errors import DatasetError, WriteError
 
 
 @contextmanager
 def folder_kept(out: Path) -> Iterator[None]:
-    """Name the folder or the manifest where an error comes from their being gone."""
+    """Name the folder or the manifest where an error comes from their being gone.
+
+    Where the disk refuses to write, say how the run goes on.
+    """
     try:
         yield
     except (DatasetError, OSError) as error:
@@ -34,7 +37,11 @@ def folder_kept(out: Path) -> Iterator[None]:
                     f"{path} was deleted or renamed while the run was going on; put it back and "
                     f"run `gensig resume {out}`, or begin another folder"
                 ) from error
-        raise
+        if not isinstance(error, WriteError):
+            if not isinstance(error, OSError) or error.errno not in REMEDIES:
+                raise
+            error = cannot_write(Path(error.filename or out), error)
+        raise WriteError(f"{error}; then `gensig resume {out}` goes on") from error
 
 
 def shard_entries(out: Path, indices: Sequence[int]) -> dict[int, ShardEntry]:

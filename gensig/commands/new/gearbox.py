@@ -15,16 +15,17 @@ from gensig.commands.new.doubts import all_doubts
 from gensig.commands.new.experiment import experiment_text, read_wishes
 from gensig.commands.new.healthy_level import read_level
 from gensig.commands.new.option_files import (
+    check_free,
     check_name,
     check_texts,
     next_commands,
-    write_all,
+    write_options,
 )
 from gensig.commands.new.staged_gearbox import new_staged, read_staged_sheet
 from gensig.commands.new.tip_relief import modification_text
 from gensig.errors import ConfigError
 
-GROUPS = ("gear", "modification", "experiment")
+GROUPS = ("gear", "modification", "experiment")  # written in this order
 N_TEETH = (2, 4, 6)  # two gears a stage
 
 # attribute, question, numbers of values; those that are needed come first
@@ -58,8 +59,7 @@ def new(arguments: Namespace) -> int:
         )
     if len(arguments.teeth) > 2:
         return new_staged(read_staged_sheet(arguments), arguments)
-    of_gears = GROUPS[:2]
-    check_name(name, of_gears, [files[group] for group in of_gears])
+    check_name(name, GROUPS[:2], ())
     wishes = read_wishes(arguments)
     option = gear_option(_sheet(arguments))
     texts = {
@@ -68,12 +68,14 @@ def new(arguments: Namespace) -> int:
         "experiment": experiment_text(option, wishes),
     }
     texts = {group: text for group, text in texts.items() if text}
+    new_files = {files[group]: text for group, text in texts.items()}
+    check_free(new_files)
     check_texts(name, texts)
     for message in all_doubts([option]):
         warnings.warn(message, stacklevel=2)
-    write_all({files[group]: text for group, text in texts.items()})
+    write_options(new_files)
     content: dict[str, Any] = {
-        "files": [str(files[group]) for group in texts],
+        "files": [str(file) for file in new_files],
         "derived": option.derived(),
         "bearings": option.bearings(),
         "next": next_commands(folder, name),

@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from gensig.dataset.storage.made_together import write_together
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.options.files import USER_FOLDER
@@ -31,9 +32,13 @@ def check_name(name: str, groups: Iterable[str], files: Iterable[Path]) -> None:
             )
     for file in files:
         if file.exists():
-            raise ConfigError(
-                f"{file} is there already; choose another name or --dir, or edit it"
-            )
+            raise _taken(file)
+
+
+def _taken(file: Path) -> ConfigError:
+    return ConfigError(
+        f"{file} is there already; choose another name or --dir, or edit it"
+    )
 
 
 def check_texts(
@@ -60,10 +65,37 @@ def check_texts(
         read_machine(config)
 
 
-def write_all(files: Mapping[Path, str]) -> None:
-    """Write texts to files, with the folders that they need."""
+def check_free(files: Mapping[Path, str]) -> None:
+    """Raise ConfigError for a file that is there with another text.
+
+    One with the same text was left by a call that was killed.
+    """
     for file, text in files.items():
-        _write(file, text)
+        if file.exists() and not _holds(file, text):
+            raise _taken(file)
+
+
+def write_options(files: Mapping[Path, str]) -> None:
+    """Write texts to those files that are missing, in their order, with their folders.
+
+    Parameters
+    ----------
+    files : of one gearbox, its experiment last: where that is, all others are
+
+    Raises
+    ------
+    DatasetError    when the disk refuses, after which nothing new is left
+    """
+    missing = {file: text for file, text in files.items() if not file.exists()}
+    write_together(missing, instead="choose another --dir")
+
+
+def _holds(file: Path, text: str) -> bool:
+    """True for an ordinary file of that text."""
+    content = text.encode()
+    if not file.is_file() or file.stat().st_size != len(content):
+        return False
+    return file.read_bytes() == content
 
 
 def _write(file: Path, text: str) -> None:

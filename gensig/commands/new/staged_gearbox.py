@@ -17,10 +17,11 @@ from gensig.commands.new.healthy_level import read_level
 from gensig.commands.new.line_option import staged_experiment_text, system_text
 from gensig.commands.new.line_tables import gears_table, shafting_table
 from gensig.commands.new.option_files import (
+    check_free,
     check_name,
     check_texts,
     next_commands,
-    write_all,
+    write_options,
 )
 from gensig.commands.new.stages import (
     StagedSheet,
@@ -31,7 +32,7 @@ from gensig.commands.new.stages import (
 from gensig.errors import ConfigError
 from gensig.geometry.bearing_sizes import bearing_for
 
-GROUPS = ("system", "experiment")
+GROUPS = ("system", "experiment")  # written in this order
 TABLES = ("shafting", "gears")
 # flags of one pair that several stages do not take, and what to do in their place
 ONE_STAGE_FLAGS = {
@@ -122,7 +123,7 @@ def new_staged(sheet: StagedSheet, arguments: Namespace) -> int:
     tables = {
         f"{table}_csv": folder / "tables" / f"{name}_{table}.csv" for table in TABLES
     }
-    check_name(name, ("system",), [*options.values(), *tables.values()])
+    check_name(name, ("system",), ())
     wishes = read_wishes(arguments)
     stages = stage_options(sheet)
     table_texts = {
@@ -133,13 +134,15 @@ def new_staged(sheet: StagedSheet, arguments: Namespace) -> int:
         "system": system_text(sheet, stages, tables),
         "experiment": staged_experiment_text(sheet, stages, wishes),
     }
+    new_files = {file: table_texts[key] for key, file in tables.items()}
+    new_files |= {file: texts[group] for group, file in options.items()}
+    check_free(new_files)
     check_texts(name, texts, table_texts)
     for message in all_doubts(stages):
         warnings.warn(message, stacklevel=2)
-    write_all({file: texts[group] for group, file in options.items()})
-    write_all({file: table_texts[key] for key, file in tables.items()})
+    write_options(new_files)
     content: dict[str, Any] = {
-        "files": [str(file) for file in (*tables.values(), *options.values())],
+        "files": [str(file) for file in new_files],
         "derived": derived(sheet, stages),
         "stages": stage_values(stages),
         "shafts": shaft_values(sheet),
