@@ -27,7 +27,7 @@ Act = Callable[[int, str], None]
 
 
 def kill_at(number: int) -> Act:
-    """SIGKILL before the operation of that number, from 1; 0 never."""
+    """SIGKILL before the operation of that number, from 1."""
 
     def act(count: int, _event: str) -> None:
         if count == number:
@@ -56,7 +56,7 @@ class Ended:
     n_operations: int
 
 
-def run_command(words: Sequence[str], folder: Path, act: Act = kill_at(0)) -> Ended:
+def run_command(words: Sequence[str], folder: Path, act: Act | None = None) -> Ended:
     """Run ``gensig`` in a copy of this process, in a folder that holds all that it changes."""
     told = folder.with_name(f"{folder.name}.told")
     process = multiprocessing.get_context("fork").Process(
@@ -73,7 +73,7 @@ def run_command(words: Sequence[str], folder: Path, act: Act = kill_at(0)) -> En
     return Ended(status=process.exitcode, said=said, n_operations=int(count or 0))
 
 
-def _run(words: tuple[str, ...], folder: Path, told: Path, act: Act) -> None:
+def _run(words: tuple[str, ...], folder: Path, told: Path, act: Act | None) -> None:
     file = os.open(told, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
@@ -87,17 +87,20 @@ def _run(words: tuple[str, ...], folder: Path, told: Path, act: Act) -> None:
     os._exit(status)
 
 
-def _counted(folder: Path, act: Act) -> Callable[[], int]:
+def _counted(folder: Path, act: Act | None) -> Callable[[], int]:
     """Install the hook; returns the number of operations so far."""
     inside, n_done = f"{folder.resolve()}{os.sep}", 0
 
     def happens(event: str) -> None:
         nonlocal n_done
         n_done += 1
-        act(n_done, event)
+        if act is not None:
+            act(n_done, event)
 
     def hook(event: str, values: tuple[Any, ...]) -> None:
-        if event not in CHANGING or not isinstance(values[0], str | bytes | os.PathLike):
+        if event not in CHANGING or not isinstance(
+            values[0], str | bytes | os.PathLike
+        ):
             return
         if event == "open" and not values[2] & (os.O_WRONLY | os.O_RDWR):
             return

@@ -176,8 +176,8 @@ def _sources_checked(
     for file, digest in zip(sources.files or (), digests, strict=False):
         if not file.is_file():
             raise DatasetError(
-                f"{file} is gone, a recording that {out} is made of; put it back there, then "
-                f"`gensig resume {out}` goes on"
+                f"{file} is gone, a recording that {out} is made of; put it back there, or "
+                f"{out.name} where it was, then `gensig resume` goes on"
             )
         if sha256_file(file) != digest:
             raise DatasetError(
@@ -189,7 +189,7 @@ def _sources_checked(
     except DatasetError as error:
         raise DatasetError(
             f"{sources.data} is gone, the simulated set that {out} is made of; put it back "
-            f"there, then `gensig resume {out}` goes on"
+            f"there, or {out.name} where it was, then `gensig resume` goes on"
         ) from error
     if found != identity:
         raise DatasetError(

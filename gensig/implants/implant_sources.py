@@ -129,7 +129,8 @@ def read_sources(out: Path) -> ImplantSources:
     words = [word.partition("=") for word in read_overrides(out)]
     try:
         given = {name: READERS[name](json.loads(text)) for name, _, text in words}
-        healthy = given["healthy"]
+        healthy, teeth = given["healthy"], given["teeth"]
+        speed_rpm, data = given["speed_rpm"], given["data"]
         options = ImplantOptions(
             gain_db=given["gain_db"],
             path=given["path"],
@@ -152,10 +153,10 @@ def read_sources(out: Path) -> ImplantSources:
             "gensig.implant the same ones and another out"
         )
     return ImplantSources(
-        data=_found(given["data"], out),
+        data=_found(data, out),
         healthy=tuple(_found(file, out) for file in healthy),
-        teeth=given["teeth"],
-        speed_rpm=given["speed_rpm"],
+        teeth=teeth,
+        speed_rpm=speed_rpm,
         options=options,
         **reading,
     )

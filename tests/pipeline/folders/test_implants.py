@@ -1,5 +1,9 @@
 """Implants in recordings of another simulated machine, from the command to a trained network."""
 
+import json
+import os
+import shutil
+
 import numpy as np
 import pytest
 from small_sets import contents
@@ -7,6 +11,7 @@ from small_sets import contents
 import gensig
 from diagnose.cli import main as diagnose
 from gensig.cli import main
+from gensig.dataset.folder.verify import verify
 from gensig.errors import DatasetError
 from gensig.implants.blocks import read_blocks, refuse_carried
 from gensig.signals.recording import read_file, recording_of
@@ -173,3 +178,124 @@ def test_a_set_without_twins_is_refused(made, capsys):
     words[1] = str(made / "mine")
     assert main(words) == 2
     assert "stores no healthy twins" in capsys.readouterr().err
+
+
+@pytest.fixture
+def place(made):
+    """A name beside the set, so that its sources are where its words say."""
+    yield made / "torn"
+    shutil.rmtree(made / "torn", ignore_errors=True)
+
+
+@pytest.fixture
+def torn(made, place):
+    """The set as a run leaves it that was killed in its shard."""
+    shutil.copytree(made / "set", place)
+    content = json.loads((place / "manifest.json").read_text())
+    content["state"] = "incomplete"
+    del content["files"]["index.h5"]
+    for entry in content["shards"]:
+        entry.update(state="planned", sha256="", bytes=0)
+        (place / "shards" / entry["name"]).unlink()
+    (place / "manifest.json").write_text(json.dumps(content))
+    for name in ("index.h5", "README.md", "SHA256SUMS"):
+        (place / name).unlink()
+    return place
+
+
+def resume(out):
+    return main(["resume", "--quiet", str(out), "--workers", "1"])
+
+
+def test_resume_finishes_a_killed_run_with_the_bytes_of_an_undisturbed_one(made, torn):
+    assert not verify(torn).complete
+    assert resume(torn) == 0
+    assert contents(torn) == contents(made / "set")
+    assert verify(torn).complete
+
+
+@pytest.mark.parametrize(
+    ("parts", "needs_sources"),
+    [
+        (["splits"], False),
+        (["splits/by_unit.csv", "index.h5"], False),
+        (["plan.csv"], True),
+        (["shards/shard-00000.h5"], True),
+    ],
+)
+def test_lost_parts_are_made_again(made, place, parts, needs_sources, capsys):
+    shutil.copytree(made / "set", place)
+    for part in parts:
+        lost = place / part
+        shutil.rmtree(lost) if lost.is_dir() else lost.unlink()
+    hidden = (made / "day1.npz").rename(made / "hidden.npz")
+    try:
+        assert resume(place) == (2 if needs_sources else 0)
+    finally:
+        hidden.rename(made / "day1.npz")
+    assert ("day1.npz is gone" in capsys.readouterr().err) == needs_sources
+    assert resume(place) == 0
+    assert contents(place) == contents(made / "set")
+    assert verify(place).complete
+
+
+def alter(path):
+    content = bytearray(path.read_bytes())
+    content[-1] ^= 1
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "said"),
+    [
+        ("day0.npz", lambda path: path.unlink(), "is gone, a recording"),
+        ("day0.npz", alter, "was altered since"),
+        ("day0.npz", lambda path: (path.unlink(), os.mkfifo(path)), "is gone"),
+        ("faults", shutil.rmtree, "is gone, the simulated set"),
+        (
+            "faults",
+            lambda path: (
+                shutil.rmtree(path),
+                shutil.copytree(path.with_name("mine"), path),
+            ),
+            "another simulated set",
+        ),
+        ("torn/overrides.yaml", alter, "was altered"),
+    ],
+)
+def test_a_source_that_is_gone_or_altered_is_named(
+    made, torn, name, change, said, capsys
+):
+    path, kept = made / name, made / "kept"
+    copied = shutil.copytree if path.is_dir() else shutil.copy
+    copied(path, kept)
+    before = contents(torn), (torn / "manifest.json").read_bytes()
+    try:
+        change(path)
+        assert resume(torn) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert said in line
+        assert str(path) in line
+    finally:
+        if path.exists():
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        kept.rename(path)
+    assert (contents(torn), (torn / "manifest.json").read_bytes()) == before
+
+
+def test_recordings_in_memory_are_told_of(made, place, capsys):
+    recordings = [
+        recording_of(read_file(str(made / f"day{day}.npz"))) for day in range(2)
+    ]
+    gensig.implant(
+        made / "faults",
+        recordings,
+        out=place,
+        teeth=(20, 33),
+        speed_rpm=1500,
+        n_records=54,
+    ).close()
+    (place / "shards" / "shard-00000.h5").unlink()
+    assert resume(place) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "recordings that were in memory" in line

@@ -1,0 +1,276 @@
+"""Every verb that writes, killed before one of its file operations and then typed again."""
+
+from __future__ import annotations
+
+import random
+import re
+import shlex
+import shutil
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+
+from benchmarks._file_operations import Ended, kill_at, run_command
+from gensig.cli import main as gensig
+from gensig.dataset.exports.export import FORMATS
+from gensig.dataset.folder.layout import MANIFEST
+from gensig.dataset.folder.manifest import read_manifest
+from gensig.dataset.folder.verify import verify
+from gensig.dataset.reader import open_dataset
+from gensig.implants import implant_plan
+
+OF_SENSOR = ("sensing.channels=[pinion_y]", "executor.n_workers=1")
+SET = (
+    *OF_SENSOR,
+    "plan.n_records=8",
+    "plan.classes=[healthy,crack]",
+    "dataset.records_per_shard=4",
+    "operating.duration_s=0.02",
+)
+RATE = "sensing.sampling_rate_hz=12800"
+FAULTS = (
+    *OF_SENSOR,
+    RATE,
+    "plan.classes=[healthy,missing_tooth,wear]",
+    "plan.n_records=18",
+    "plan.n_units=6",
+    "plan.machines=separate",
+    "operating.duration_s=0.4",
+    "sensing.snr_db=null",
+    "dataset.store_healthy_twin=true",
+)
+TEETH, SPEED = ("20", "33"), "1500"
+MACHINE = (
+    *OF_SENSOR,
+    RATE,
+    f"gear.pinion.n_teeth={TEETH[0]}",
+    f"gear.wheel.n_teeth={TEETH[1]}",
+    f"operating.speed_rpm={SPEED}",
+    "operating.torque_nm=20",
+    "plan.classes=[healthy]",
+    "plan.n_records=1",
+    "operating.duration_s=6",
+)
+NEW = "new gearbox mine --teeth 20 45 --module 3 --speed 1500 --torque 60 --no-level"
+STAGED = "new gearbox two --teeth 20 45 23 61 --module 2 3 --speed 1500 --torque 60 --no-level"
+# files of a data set that tell of time and place, and its closing
+NOT_COMPARED = {
+    MANIFEST,
+    "README.md",
+    "croissant.json",
+    "SHA256SUMS",
+    "run.log",
+    ".beginning",
+}
+IMPLANT_SHARD = 2**19  # bytes, so that a small set of implants has several shards
+SHARE = {"generate": 4, "implant": 4, "resume": 3, "resume implants": 3, "finalize": 2}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """A command, in a folder where it finds what it goes on with.
+
+    Attributes
+    ----------
+    words : of the command; what it writes is named from its folder
+    target : file or folder that it writes
+    begun : folder of which the target is a copy at first; None: there is none
+    """
+
+    words: tuple[str, ...]
+    target: str
+    begun: Path | None = None
+
+    def folder(self, path: Path) -> Path:
+        """Make a folder in which the command can run."""
+        path.mkdir()
+        if self.begun is not None:
+            shutil.copytree(self.begun, path / self.target)
+        return path
+
+
+def cases(kit: Path) -> dict[str, Case]:
+    """All cases, after their inputs are made in a folder."""
+    whole, begun = kit / "whole", kit / "begun"
+    _make("generate", "--quiet", *SET, f"out={whole}")
+    _make("plan", "--freeze", *SET, f"out={begun}")
+    made = shutil.copytree(begun, kit / "made")
+    task = ("executor=slurm", "executor.shard_index=0", "executor.shard_count=1")
+    _make("generate", "--quiet", *SET[:1], *SET[2:], *task, f"out={made}")
+    implant = _implant(kit)
+    # beside those that are killed, so that its sources are where its words say
+    implants = kit.parent / "implants" / "data"
+    _begun(implant, implants)
+    found = {
+        "generate": Case(words=("generate", *SET, "out=data"), target="data"),
+        "plan --freeze": Case(
+            words=("plan", "--freeze", *SET, "out=data"), target="data"
+        ),
+        "resume": Case(words=("resume", "data", "-j", "1"), target="data", begun=begun),
+        "finalize": Case(words=("finalize", "data"), target="data", begun=made),
+        "implant": Case(words=implant, target="data"),
+        "resume implants": Case(
+            words=("resume", "data", "-j", "1"), target="data", begun=implants
+        ),
+        "report": Case(
+            words=("report", str(whole), "--out", "page.html"), target="page.html"
+        ),
+        "reproduce": Case(
+            words=("reproduce", "data", "--records", "2"), target="data", begun=whole
+        ),
+        "new": Case(words=(*NEW.split(), "--dir", "options"), target="options"),
+        "new, stages": Case(
+            words=(*STAGED.split(), "--dir", "options"), target="options"
+        ),
+    }
+    for name in FORMATS:
+        words = ("export", str(whole), "--to", name, "--out", "there")
+        found[f"export {name}"] = Case(words=words, target="there")
+    return found
+
+
+def _begun(words: tuple[str, ...], target: Path) -> None:
+    """Run a command that is killed when its folder has been begun and has no shard."""
+    for number in count(40, 4):
+        target.parent.mkdir()
+        ended = run_command(words, target.parent, kill_at(number))
+        if (target / MANIFEST).is_file() or not ended.status:
+            return
+        shutil.rmtree(target.parent)
+
+
+def _make(*words: str) -> None:
+    if gensig(words):
+        raise SystemExit(f"gensig {' '.join(words)} failed")
+
+
+def _implant(kit: Path) -> tuple[str, ...]:
+    """A small ``gensig implant``, with its simulated set and its recording."""
+    _make("generate", "--quiet", *FAULTS, f"out={kit / 'faults'}")
+    _make("generate", "--quiet", *MACHINE, f"out={kit / 'machine'}")
+    file = kit / "healthy.npz"
+    with open_dataset(kit / "machine") as machine:
+        np.savez(
+            file,
+            acceleration=machine.signals(0),
+            sampling_rate_hz=machine.sampling_rate,
+        )
+    words = ("implant", str(kit / "faults"), "out=data", "--teeth", *TEETH)
+    words += ("--speed-rpm", SPEED, "--records", "48", "--healthy", str(file))
+    return words
+
+
+def contents(path: Path) -> dict[str, bytes]:
+    """Bytes of a file, or of all files of a folder that must be equal; no hidden ones."""
+    if path.is_file():
+        return {"": path.read_bytes()}
+    files = [each for each in path.rglob("*") if each.is_file()]
+    return {
+        each.relative_to(path).as_posix(): each.read_bytes()
+        for each in files
+        if each.name not in NOT_COMPARED and not each.name.startswith(".")
+    }
+
+
+def hidden(path: Path) -> list[str]:
+    """Hidden files in a folder: those of writers that were killed."""
+    return sorted(each.name for each in path.rglob(".*"))
+
+
+def kill_verbs(
+    n_kills: int, seed: int, folder: Path
+) -> Iterator[tuple[str, list[str]]]:
+    """Name of a case and its problems, a kill at a time; a case has at least one.
+
+    The kills of a case are spread over its operations, at random within each stretch.
+    """
+    kit, rng = folder / "kit", random.Random(seed)
+    kit.mkdir()
+    with patch.object(implant_plan, "SHARD_BYTES", IMPLANT_SHARD):
+        all_cases = cases(kit)
+        shares = [name for name in all_cases for _ in range(SHARE.get(name, 1))]
+        taken = Counter(all_cases.keys())
+        while taken.total() < n_kills:
+            wanted = n_kills - taken.total()
+            taken.update(rng.sample(shares, min(len(shares), wanted)))
+        for name, case in all_cases.items():
+            yield from _kill_case(name, case, taken[name], rng, folder)
+
+
+def _kill_case(
+    name: str, case: Case, n_kills: int, rng: random.Random, folder: Path
+) -> Iterator[tuple[str, list[str]]]:
+    wanted, n_operations = _undisturbed(case, folder / "undisturbed")
+    for number in range(n_kills):
+        share = (number + rng.random()) / n_kills
+        at = 1 + int(share * max(n_operations, 1))
+        problems = killed_case(case, at, wanted, folder / "killed")
+        where = f"{name}, operation {at} of {n_operations}"
+        yield name, [f"{where}: {line}" for line in problems]
+
+
+def _undisturbed(case: Case, folder: Path) -> tuple[dict[str, bytes], int]:
+    ended = run_command(case.words, case.folder(folder))
+    if ended.status:
+        raise SystemExit(f"undisturbed {case.words[0]} failed: {ended.said}")
+    wanted = contents(folder / case.target)
+    shutil.rmtree(folder)
+    return wanted, ended.n_operations
+
+
+def killed_case(
+    case: Case, at: int, wanted: dict[str, bytes], folder: Path
+) -> list[str]:
+    """Kill a command before an operation, type it again, do as it says; returns what is wrong."""
+    target = case.folder(folder) / case.target
+    run_command(case.words, folder, kill_at(at))
+    problems = _not_whole(target, wanted)
+    again = run_command(case.words, folder)
+    problems += _followed(again, folder, contents(target) == wanted)
+    made = contents(target)
+    if case.words[0] == "plan" and (target / MANIFEST).is_file():
+        made = {name: made[name] for name in made if name in wanted}  # no shards
+    problems += sorted(
+        f"{name or 'the file'} differs in the end"
+        for name in {*wanted, *made}
+        if wanted.get(name) != made.get(name)
+    )
+    if (target / MANIFEST).is_file() and read_manifest(target).is_complete:
+        problems += verify(target).problems + hidden(target)
+    shutil.rmtree(folder)
+    return problems
+
+
+def _not_whole(target: Path, wanted: dict[str, bytes]) -> list[str]:
+    """Files after the kill that are neither whole nor absent; a set that looks whole and is not."""
+    lines = [
+        f"{name} is not whole"
+        for name, content in contents(target).items()
+        if name in wanted and content != wanted[name]
+    ]
+    if (target / MANIFEST).is_file():
+        is_whole = read_manifest(target).is_complete
+        if is_whole != verify(target).complete:
+            lines.append("looks whole and is not")
+    return lines
+
+
+def _followed(again: Ended, folder: Path, is_there: bool) -> list[str]:
+    """Do what the command says when it is typed again; returns what is wrong with that."""
+    lines = again.said.splitlines()
+    if again.status == 0:
+        return []
+    if again.status != 2 or len(lines) != 1:
+        return [f"typed again it ends with {again.status}: {again.said[-300:]}"]
+    remedy = re.search("`gensig ([^`]*)`", lines[0])
+    if remedy is None:
+        return [] if is_there else [f"typed again it is refused: {lines[0]}"]
+    ended = run_command(shlex.split(remedy[1]), folder)
+    if ended.status:
+        return [f"`gensig {remedy[1]}` ends with {ended.status}: {ended.said[-300:]}"]
+    return []
