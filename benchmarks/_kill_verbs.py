@@ -7,8 +7,9 @@ import re
 import shlex
 import shutil
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import count
 from pathlib import Path
 from unittest.mock import patch
@@ -94,54 +95,64 @@ class Case:
         return path
 
 
-def cases(kit: Path) -> dict[str, Case]:
-    """All cases, after their inputs are made in a folder."""
-    whole, begun = kit / "whole", kit / "begun"
-    _make("generate", "--quiet", *SET, f"out={whole}")
-    _make("plan", "--freeze", *SET, f"out={begun}")
-    made = shutil.copytree(begun, kit / "made")
-    task = ("executor=slurm", "executor.shard_index=0", "executor.shard_count=1")
-    _make("generate", "--quiet", *SET[:1], *SET[2:], *task, f"out={made}")
-    implant = _implant(kit)
-    # beside those that are killed, so that its sources are where its words say
-    implants = kit.parent / "implants" / "data"
-    _begun(implant, implants)
-    found = {
-        "generate": Case(words=("generate", *SET, "out=data"), target="data"),
-        "plan --freeze": Case(
-            words=("plan", "--freeze", *SET, "out=data"), target="data"
-        ),
-        "resume": Case(words=("resume", "data", "-j", "1"), target="data", begun=begun),
-        "finalize": Case(words=("finalize", "data"), target="data", begun=made),
-        "implant": Case(words=implant, target="data"),
-        "resume implants": Case(
-            words=("resume", "data", "-j", "1"), target="data", begun=implants
-        ),
-        "report": Case(
-            words=("report", str(whole), "--out", "page.html"), target="page.html"
-        ),
-        "reproduce": Case(
-            words=("reproduce", "data", "--records", "2"), target="data", begun=whole
-        ),
-        "new": Case(words=(*NEW.split(), "--dir", "options"), target="options"),
-        "new, stages": Case(
-            words=(*STAGED.split(), "--dir", "options"), target="options"
-        ),
-    }
-    for name in FORMATS:
-        words = ("export", str(whole), "--to", name, "--out", "there")
-        found[f"export {name}"] = Case(words=words, target="there")
-    return found
+class Kit:
+    """Inputs of all cases, each made when it is first asked for.
 
+    Folders of cases lie beside ``folder``, which places of implants count on.
+    """
 
-def _begun(words: tuple[str, ...], target: Path) -> None:
-    """Run a command that is killed when its folder has been begun and has no shard."""
-    for number in count(40, 4):
-        target.parent.mkdir()
-        ended = run_command(words, target.parent, kill_at(number))
-        if (target / MANIFEST).is_file() or not ended.status:
-            return
-        shutil.rmtree(target.parent)
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        folder.mkdir()
+
+    @cached_property
+    def whole(self) -> Path:
+        """A data set that is complete."""
+        out = self.folder / "whole"
+        _make("generate", "--quiet", *SET, f"out={out}")
+        return out
+
+    @cached_property
+    def begun(self) -> Path:
+        """The same without a shard."""
+        out = self.folder / "begun"
+        _make("plan", "--freeze", *SET, f"out={out}")
+        return out
+
+    @cached_property
+    def made(self) -> Path:
+        """The same with all shards, by a task of an array job."""
+        out = self.folder / "made"
+        shutil.copytree(self.begun, out)
+        task = ("executor=slurm", "executor.shard_index=0", "executor.shard_count=1")
+        words = [word for word in SET if not word.startswith("executor")]
+        _make("generate", "--quiet", *words, *task, f"out={out}")
+        return out
+
+    @cached_property
+    def implant(self) -> tuple[str, ...]:
+        """A small ``gensig implant``, with its simulated set and its recording."""
+        faults, machine = self.folder / "faults", self.folder / "machine"
+        _make("generate", "--quiet", *FAULTS, f"out={faults}")
+        _make("generate", "--quiet", *MACHINE, f"out={machine}")
+        file = self.folder / "healthy.npz"
+        with open_dataset(machine) as data:
+            rate = data.sampling_rate
+            np.savez(file, acceleration=data.signals(0), sampling_rate_hz=rate)
+        words = ("implant", str(faults), "out=data", "--teeth", *TEETH)
+        return (*words, "--speed-rpm", SPEED, "--records", "48", "--healthy", str(file))
+
+    @cached_property
+    def begun_implants(self) -> Path:
+        """A set of implants without a shard."""
+        out = self.folder.parent / "implants" / "data"
+        for number in count(40, 4):
+            out.parent.mkdir()
+            ended = run_command(self.implant, out.parent, kill_at(number))
+            if (out / MANIFEST).is_file() or not ended.status:
+                break
+            shutil.rmtree(out.parent)
+        return out
 
 
 def _make(*words: str) -> None:
@@ -149,20 +160,42 @@ def _make(*words: str) -> None:
         raise SystemExit(f"gensig {' '.join(words)} failed")
 
 
-def _implant(kit: Path) -> tuple[str, ...]:
-    """A small ``gensig implant``, with its simulated set and its recording."""
-    _make("generate", "--quiet", *FAULTS, f"out={kit / 'faults'}")
-    _make("generate", "--quiet", *MACHINE, f"out={kit / 'machine'}")
-    file = kit / "healthy.npz"
-    with open_dataset(kit / "machine") as machine:
-        np.savez(
-            file,
-            acceleration=machine.signals(0),
-            sampling_rate_hz=machine.sampling_rate,
-        )
-    words = ("implant", str(kit / "faults"), "out=data", "--teeth", *TEETH)
-    words += ("--speed-rpm", SPEED, "--records", "48", "--healthy", str(file))
-    return words
+RESUME = ("resume", "data", "-j", "1")
+
+
+def _export(name: str) -> Callable[[Kit], Case]:
+    def case(kit: Kit) -> Case:
+        words = ("export", str(kit.whole), "--to", name, "--out", "there")
+        return Case(words=words, target="there")
+
+    return case
+
+
+CASES: dict[str, Callable[[Kit], Case]] = {
+    "generate": lambda _: Case(words=("generate", *SET, "out=data"), target="data"),
+    "plan --freeze": lambda _: Case(
+        words=("plan", "--freeze", *SET, "out=data"), target="data"
+    ),
+    "resume": lambda kit: Case(words=RESUME, target="data", begun=kit.begun),
+    "finalize": lambda kit: Case(
+        words=("finalize", "data"), target="data", begun=kit.made
+    ),
+    "implant": lambda kit: Case(words=kit.implant, target="data"),
+    "resume implants": lambda kit: Case(
+        words=RESUME, target="data", begun=kit.begun_implants
+    ),
+    "report": lambda kit: Case(
+        words=("report", str(kit.whole), "--out", "page.html"), target="page.html"
+    ),
+    "reproduce": lambda kit: Case(
+        words=("reproduce", "data", "--records", "2"), target="data", begun=kit.whole
+    ),
+    "new": lambda _: Case(words=(*NEW.split(), "--dir", "options"), target="options"),
+    "new, stages": lambda _: Case(
+        words=(*STAGED.split(), "--dir", "options"), target="options"
+    ),
+    **{f"export {name}": _export(name) for name in FORMATS},
+}
 
 
 def contents(path: Path) -> dict[str, bytes]:
@@ -183,23 +216,25 @@ def hidden(path: Path) -> list[str]:
 
 
 def kill_verbs(
-    n_kills: int, seed: int, folder: Path
+    n_kills: int, seed: int, folder: Path, names: Sequence[str] = tuple(CASES)
 ) -> Iterator[tuple[str, list[str]]]:
-    """Name of a case and its problems, a kill at a time; a case has at least one.
+    """Name of a case and its problems, a kill at a time; every case has at least one.
 
     The kills of a case are spread over its operations, at random within each stretch.
+
+    Parameters
+    ----------
+    names : cases of `CASES` that are killed
     """
-    kit, rng = folder / "kit", random.Random(seed)
-    kit.mkdir()
+    kit, rng = Kit(folder / "kit"), random.Random(seed)
+    shares = [name for name in names for _ in range(SHARE.get(name, 1))]
+    taken = Counter(names)
+    while taken.total() < n_kills:
+        wanted = n_kills - taken.total()
+        taken.update(rng.sample(shares, min(len(shares), wanted)))
     with patch.object(implant_plan, "SHARD_BYTES", IMPLANT_SHARD):
-        all_cases = cases(kit)
-        shares = [name for name in all_cases for _ in range(SHARE.get(name, 1))]
-        taken = Counter(all_cases.keys())
-        while taken.total() < n_kills:
-            wanted = n_kills - taken.total()
-            taken.update(rng.sample(shares, min(len(shares), wanted)))
-        for name, case in all_cases.items():
-            yield from _kill_case(name, case, taken[name], rng, folder)
+        for name in names:
+            yield from _kill_case(name, CASES[name](kit), taken[name], rng, folder)
 
 
 def _kill_case(

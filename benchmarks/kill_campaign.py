@@ -1,8 +1,12 @@
-"""Kill a run at random moments, resume it, compare: ``python -m benchmarks.kill_campaign [--kills
-200]``.
+"""Kill commands, go on as they say, compare: ``python -m benchmarks.kill_campaign [--kills 200]
+[--verbs 100]``.
 
-Each data set is begun with ``gensig generate`` and killed (SIGKILL) up to five times; then it
-is resumed, verified, and every file that counts as the data set is compared with an
+With ``--verbs`` every verb that writes is killed before one of its file operations, typed again,
+and followed where it names a command (``benchmarks/_kill_verbs.py``). Files must be whole or absent
+after the kill, and have the bytes of an undisturbed run in the end.
+
+With ``--kills`` each data set is begun with ``gensig generate`` and killed (SIGKILL) up to five
+times; then it is resumed, verified, and every file that counts as the data set is compared with an
 uninterrupted run byte by byte. After each kill the folder must not look whole unless it is; one
 that was killed before it had a manifest is begun again by the same command.
 
@@ -29,6 +33,7 @@ from collections import Counter
 from contextlib import suppress
 from pathlib import Path
 
+from benchmarks._kill_verbs import kill_verbs
 from gensig.cli import main as gensig
 from gensig.dataset.folder.manifest import read_manifest
 from gensig.dataset.folder.verify import verify
@@ -274,19 +279,41 @@ def campaign(n_kills: int, seed: int, folder: Path) -> tuple[Counter[str], list[
     return outcome, problems
 
 
+def verbs_campaign(
+    n_kills: int, seed: int, folder: Path
+) -> tuple[Counter[str], list[str]]:
+    """Kills by verb, and every way in which one was not as it should be; see `kill_verbs`."""
+    outcome: Counter[str] = Counter()
+    problems: list[str] = []
+    for name, lines in kill_verbs(n_kills, seed, folder):
+        outcome[name] += 1
+        problems += lines
+        print(f"{outcome.total()}: {name}", *lines, sep="\n  ", file=sys.stderr)
+    return outcome, problems
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--kills", type=int, default=200)
+    parser.add_argument("--kills", type=int, default=200, help="at random moments")
+    parser.add_argument("--verbs", type=int, default=100, help="of all verbs; 0: none")
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
-    begin = time.monotonic()
-    with tempfile.TemporaryDirectory() as folder:
-        outcome, problems = campaign(arguments.kills, arguments.seed, Path(folder))
-    facts = ", ".join(f"{name} {count}" for name, count in sorted(outcome.items()))
-    print(f"{facts}; {len(problems)} problem(s), {time.monotonic() - begin:.0f} s")
-    for problem in problems:
-        print(problem)
-    return 1 if problems or n_kills_of(outcome) < arguments.kills else 0
+    begin, status = time.monotonic(), 0
+    for run, n_kills in (
+        (campaign, arguments.kills),
+        (verbs_campaign, arguments.verbs),
+    ):
+        if not n_kills:
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            outcome, problems = run(n_kills, arguments.seed, Path(folder))
+        facts = ", ".join(f"{name} {count}" for name, count in sorted(outcome.items()))
+        print(f"{facts}; {len(problems)} problem(s), {time.monotonic() - begin:.0f} s")
+        for problem in problems:
+            print(problem)
+        too_few = run is campaign and n_kills_of(outcome) < n_kills
+        status = max(status, int(bool(problems) or too_few))
+    return status
 
 
 if __name__ == "__main__":

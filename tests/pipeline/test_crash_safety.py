@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from small_sets import TINY, contents, make
 
+from benchmarks._kill_verbs import kill_verbs
 from benchmarks.kill_campaign import campaign, n_kills_of
 from gensig.cli import main
 from gensig.dataset.folder import beginning
@@ -59,6 +60,12 @@ def test_killed_at_random_moments_it_ends_byte_equal(tmp_path):
     outcome, problems = campaign(3, seed, tmp_path)
     assert problems == [], seed
     assert n_kills_of(outcome) >= 3, (outcome, seed)
+
+
+@pytest.mark.parametrize("name", ["plan --freeze", "finalize", "export wav"])
+def test_a_verb_killed_between_file_operations_is_finished_as_it_says(tmp_path, name):
+    seed = time.time_ns()
+    assert list(kill_verbs(1, seed, tmp_path, [name])) == [(name, [])], seed
 
 
 def alive_in_group(group):
