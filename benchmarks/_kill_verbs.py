@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import random
 import re
 import shlex
@@ -16,7 +17,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from benchmarks._file_operations import Ended, kill_at, run_command
+from benchmarks._file_operations import Ended, kill_at, refuse_from, run_command
 from gensig.cli import main as gensig
 from gensig.dataset.exports.export import FORMATS
 from gensig.dataset.folder.layout import MANIFEST
@@ -216,7 +217,12 @@ def hidden(path: Path) -> list[str]:
 
 
 def kill_verbs(
-    n_kills: int, seed: int, folder: Path, names: Sequence[str] = tuple(CASES)
+    n_kills: int,
+    seed: int,
+    folder: Path,
+    names: Sequence[str] = tuple(CASES),
+    *,
+    full: bool = False,
 ) -> Iterator[tuple[str, list[str]]]:
     """Name of a case and its problems, a kill at a time; every case has at least one.
 
@@ -225,6 +231,7 @@ def kill_verbs(
     Parameters
     ----------
     names : cases of `CASES` that are killed
+    full : the disk is full from an operation on, in place of the kill
     """
     kit, rng = Kit(folder / "kit"), random.Random(seed)
     shares = [name for name in names for _ in range(SHARE.get(name, 1))]
@@ -234,19 +241,14 @@ def kill_verbs(
         taken.update(rng.sample(shares, min(len(shares), wanted)))
     with patch.object(implant_plan, "SHARD_BYTES", IMPLANT_SHARD):
         for name in names:
-            yield from _kill_case(name, CASES[name](kit), taken[name], rng, folder)
-
-
-def _kill_case(
-    name: str, case: Case, n_kills: int, rng: random.Random, folder: Path
-) -> Iterator[tuple[str, list[str]]]:
-    wanted, n_operations = _undisturbed(case, folder / "undisturbed")
-    for number in range(n_kills):
-        share = (number + rng.random()) / n_kills
-        at = 1 + int(share * max(n_operations, 1))
-        problems = killed_case(case, at, wanted, folder / "killed")
-        where = f"{name}, operation {at} of {n_operations}"
-        yield name, [f"{where}: {line}" for line in problems]
+            case = CASES[name](kit)
+            wanted, n_operations = _undisturbed(case, folder / "undisturbed")
+            for number in range(taken[name]):
+                share = (number + rng.random()) / taken[name]
+                at = 1 + int(share * max(n_operations, 1))
+                problems = stopped_case(case, at, wanted, folder / "stopped", full=full)
+                where = f"{name}, operation {at} of {n_operations}"
+                yield name, [f"{where}: {line}" for line in problems]
 
 
 def _undisturbed(case: Case, folder: Path) -> tuple[dict[str, bytes], int]:
@@ -258,13 +260,19 @@ def _undisturbed(case: Case, folder: Path) -> tuple[dict[str, bytes], int]:
     return wanted, ended.n_operations
 
 
-def killed_case(
-    case: Case, at: int, wanted: dict[str, bytes], folder: Path
+def stopped_case(
+    case: Case, at: int, wanted: dict[str, bytes], folder: Path, *, full: bool
 ) -> list[str]:
-    """Kill a command before an operation, type it again, do as it says; returns what is wrong."""
+    """Stop a command before an operation, type it again, do as it says; returns what is wrong."""
     target = case.folder(folder) / case.target
-    run_command(case.words, folder, kill_at(at))
-    problems = _not_whole(target, wanted)
+    if full:
+        before = contents(target)
+        ended = run_command(case.words, folder, refuse_from(at, errno.ENOSPC))
+        problems = _not_told(ended, before, contents(target), wanted)
+    else:
+        run_command(case.words, folder, kill_at(at))
+        problems = []
+    problems += _not_whole(target, wanted)
     again = run_command(case.words, folder)
     problems += _followed(again, folder, contents(target) == wanted)
     made = contents(target)
@@ -279,6 +287,22 @@ def killed_case(
         problems += verify(target).problems + hidden(target)
     shutil.rmtree(folder)
     return problems
+
+
+def _not_told(
+    ended: Ended,
+    before: dict[str, bytes],
+    after: dict[str, bytes],
+    wanted: dict[str, bytes],
+) -> list[str]:
+    """What is wrong with the end of a command on a full disk, which may refuse its log alone."""
+    if ended.status == 0:
+        return [] if after == wanted else ["ends with 0 and is not whole"]
+    if ended.status not in (1, 2) or "free some space" not in ended.said:
+        return [f"ends with {ended.status}: {ended.said[-300:]}"]
+    if after != before and after != wanted and "gensig resume" not in ended.said:
+        return [f"leaves {sorted(after)} and does not say how it goes on"]
+    return []
 
 
 def _not_whole(target: Path, wanted: dict[str, bytes]) -> list[str]:

@@ -1,9 +1,10 @@
 """Kill commands, go on as they say, compare: ``python -m benchmarks.kill_campaign [--kills 200]
-[--verbs 100]``.
+[--verbs 100] [--full 50]``.
 
 With ``--verbs`` every verb that writes is killed before one of its file operations, typed again,
 and followed where it names a command (``benchmarks/_kill_verbs.py``). Files must be whole or absent
-after the kill, and have the bytes of an undisturbed run in the end.
+after the kill, and have the bytes of an undisturbed run in the end. ``--full`` does the same with a
+disk that is full from an operation on; there the command must leave nothing, or say how it goes on.
 
 With ``--kills`` each data set is begun with ``gensig generate`` and killed (SIGKILL) up to five
 times; then it is resumed, verified, and every file that counts as the data set is compared with an
@@ -20,6 +21,7 @@ a run.
 from __future__ import annotations
 
 import argparse
+import functools
 import multiprocessing
 import os
 import random
@@ -280,12 +282,12 @@ def campaign(n_kills: int, seed: int, folder: Path) -> tuple[Counter[str], list[
 
 
 def verbs_campaign(
-    n_kills: int, seed: int, folder: Path
+    n_kills: int, seed: int, folder: Path, *, full: bool = False
 ) -> tuple[Counter[str], list[str]]:
     """Kills by verb, and every way in which one was not as it should be; see `kill_verbs`."""
     outcome: Counter[str] = Counter()
     problems: list[str] = []
-    for name, lines in kill_verbs(n_kills, seed, folder):
+    for name, lines in kill_verbs(n_kills, seed, folder, full=full):
         outcome[name] += 1
         problems += lines
         print(f"{outcome.total()}: {name}", *lines, sep="\n  ", file=sys.stderr)
@@ -296,13 +298,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--kills", type=int, default=200, help="at random moments")
     parser.add_argument("--verbs", type=int, default=100, help="of all verbs; 0: none")
+    parser.add_argument("--full", type=int, default=50, help="full disks; 0: none")
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     begin, status = time.monotonic(), 0
-    for run, n_kills in (
+    parts = (
         (campaign, arguments.kills),
         (verbs_campaign, arguments.verbs),
-    ):
+        (functools.partial(verbs_campaign, full=True), arguments.full),
+    )
+    for run, n_kills in parts:
         if not n_kills:
             continue
         with tempfile.TemporaryDirectory() as folder:
