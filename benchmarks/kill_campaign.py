@@ -297,8 +297,8 @@ def verbs_campaign(
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--kills", type=int, default=200, help="at random moments")
-    parser.add_argument("--verbs", type=int, default=100, help="of all verbs; 0: none")
-    parser.add_argument("--full", type=int, default=50, help="full disks; 0: none")
+    parser.add_argument("--verbs", type=int, default=0, help="of all verbs that write")
+    parser.add_argument("--full", type=int, default=0, help="full disks, of all verbs")
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     begin, status = time.monotonic(), 0
