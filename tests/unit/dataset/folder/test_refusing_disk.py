@@ -10,8 +10,9 @@ from test_beginning import begin, files
 
 from gensig.dataset.folder.layout import MANIFEST
 from gensig.dataset.storage import made_together
-from gensig.dataset.storage.atomic import REMEDIES
+from gensig.dataset.storage.atomic import REMEDIES, cannot_write
 from gensig.errors import DatasetError
+from gensig.production.run_check import folder_kept
 
 TAKING = ("mkdir", "fsync", "replace")
 REMOVING = ("unlink", "rmdir", "remove")
@@ -101,3 +102,22 @@ def test_a_disk_that_is_read_only_keeps_its_remedy(tmp_path):
             continue  # only the note could not be removed any more
         begin(out)
         assert (out / MANIFEST).is_file()
+
+
+@pytest.mark.parametrize(
+    ("error", "is_told"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device", "shards/x"), True),
+        (cannot_write(Path("x"), OSError(errno.ENOSPC, "No space left")), True),
+        (OSError(errno.EIO, "Input/output error"), False),
+        (DatasetError("plan.csv was altered"), False),
+    ],
+)
+def test_a_run_on_a_full_disk_says_how_it_goes_on(tmp_path, error, is_told):
+    begin(tmp_path / "set")
+    out = tmp_path / "set"
+    with pytest.raises((DatasetError, OSError)) as caught, folder_kept(out):
+        raise error
+    line = str(caught.value)
+    assert (f"then `gensig resume {out}` goes on" in line) == is_told
+    assert line.count(REMEDIES[errno.ENOSPC]) == is_told
