@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from gensig.errors import ConfigError
+from gensig.terminal.printing import show, show_text, tell_text
 from gensig.terminal.program import HELP_FLAGS, Parser, exit_text, guarded, refuse_verb
 from gensig.version import __version__
 
@@ -77,11 +78,13 @@ def _dispatch(words: list[str]) -> int:
     if words[:1] == ["help"]:
         words = [*words[1:2], HELP_FLAGS[1]]
     if not words or words[0] in HELP_FLAGS:
-        file, status = (sys.stdout, 0) if words else (sys.stderr, 2)
-        print(_help(), file=file)
-        return status
+        if not words:
+            tell_text(_help())
+            return 2
+        show_text(_help())
+        return 0
     if words[0] in ("-V", "--version"):
-        print(f"diagnose {__version__}")
+        show(f"diagnose {__version__}")
         return 0
     if words[0] in REMOVED:
         raise ConfigError(f"'{words[0]}' was {REMOVED[words[0]]}")

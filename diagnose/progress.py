@@ -7,6 +7,9 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from gensig.terminal.printing import tell
+from gensig.text.escaping import escaped
+
 
 @contextmanager
 def progress(n_steps: int, what: str = "training") -> Iterator[Callable[[str], None]]:
@@ -22,7 +25,7 @@ def progress(n_steps: int, what: str = "training") -> Iterator[Callable[[str], N
         nonlocal done
         done += 1
         elapsed = f"{time.perf_counter() - started:.0f} s"
-        print(f"[{done}/{n_steps}] {elapsed}  {line}", file=sys.stderr, flush=True)
+        tell(f"[{done}/{n_steps}] {elapsed}  {line}")
 
     yield write
 
@@ -49,4 +52,4 @@ def _bar(n_steps: int, what: str) -> Iterator[Callable[[str], None]]:
     )
     with Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(what, total=n_steps)
-        yield lambda line: bar.update(task, advance=1, description=line)
+        yield lambda line: bar.update(task, advance=1, description=escaped(line))

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from gensig.commands.flags import OVERRIDES_HELP
 from gensig.commands.verbs import GROUPS, VERBS
+from gensig.terminal.printing import show, show_text, tell_text
 from gensig.terminal.program import HELP_FLAGS, Parser, exit_text, guarded, refuse_verb
 from gensig.version import __version__
 
@@ -46,14 +47,14 @@ def _run(words: list[str]) -> int:
     if words[:1] == ["help"]:
         words = [*words[1:2], HELP_FLAGS[1]]
     if not words:
-        print(_help(), file=sys.stderr)
+        tell_text(_help())
         return 2
     name, *arguments = words
     if name in HELP_FLAGS:
-        print(_help())
+        show_text(_help())
         return 0
     if name in ("-V", "--version"):
-        print(f"gensig {__version__}")
+        show(f"gensig {__version__}")
         return 0
     if name not in VERBS:
         refuse_verb(PROGRAM, name, VERBS, "diagnose", OF_DIAGNOSE)

@@ -62,7 +62,7 @@ GENSIG = {
     "measured mesh "
     "operation options papers plan production record report signals systems terminal text "
     "twin units",
-    "dataset": "errors signals version",
+    "dataset": "errors signals text version",
     "driveline": (
         "dynamics errors faults geometry life material mesh operation options sensing "
         "systems text units"

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from diagnose.commands.parser import refuse_existing
 from gensig.errors import ConfigError
+from gensig.terminal.printing import remark, show
 
 if TYPE_CHECKING:
     from diagnose.bridge.bridge_machine import BridgeMachine
@@ -70,9 +70,9 @@ def run(arguments: Namespace) -> int:
     found = _opened(arguments.on)
     machine = bridge_machine(found, FROZEN, machine=arguments.machine)
     if arguments.data is None:
-        print("no --data: a source of residuals for this machine is made by")
-        print("\n".join(f"  {line}" for line in source_lines(machine)))
-        print(
+        show("no --data: a source of residuals for this machine is made by")
+        show(*[f"  {line}" for line in source_lines(machine)])
+        show(
             "module and torque are assumed where the set does not tell them: give yours"
         )
         return 0
@@ -86,9 +86,9 @@ def run(arguments: Namespace) -> int:
     with open_dataset(arguments.data) as data:
         result = run_bridge(machine, data, FROZEN, on_step=_step)
     page = write_bridge(Path(arguments.out), found, Path(arguments.data), result)
-    print("\n".join(headline(result)))
-    print("\n".join(one.sentence for one in comparisons(result)))
-    print(f"{page}: the page, with the confusion of every method")
+    show(*headline(result))
+    show(*[one.sentence for one in comparisons(result)])
+    show(f"{page}: the page, with the confusion of every method")
     return 0
 
 
@@ -118,4 +118,4 @@ def source_lines(machine: BridgeMachine) -> list[str]:
 
 
 def _step(text: str) -> None:
-    print(f"diagnose: {text}", file=sys.stderr, flush=True)
+    remark("diagnose", text)

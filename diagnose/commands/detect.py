@@ -12,6 +12,7 @@ from diagnose.commands.parser import (
     add_sampling_rate,
     add_tacho,
 )
+from gensig.terminal.printing import show, show_text
 
 if TYPE_CHECKING:
     from diagnose.detection.followed_shafts import FollowedRecording
@@ -114,10 +115,10 @@ def run(arguments: Namespace) -> int:
 
         contents = [finding_content(finding) for finding in findings]
         printed = contents[0] if len(contents) == 1 else contents
-        print(json.dumps(printed, indent=2, allow_nan=False))
+        show_text(json.dumps(printed, indent=2, allow_nan=False))
     else:
         for finding in findings:
-            print("\n".join(finding_lines(finding)))
+            show(*finding_lines(finding))
     if any(finding.is_changed for finding in findings):
         return CHANGED
     return 0

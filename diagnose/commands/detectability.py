@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from functools import partial
@@ -10,6 +9,7 @@ from pathlib import Path
 
 from diagnose.commands.parser import add_overrides
 from gensig.errors import ConfigError
+from gensig.terminal.printing import remark, show
 from gensig.terminal.warning_lines import one_line_warnings
 
 HELP = """\
@@ -111,9 +111,9 @@ def run(arguments: Namespace) -> int:
         n_workers = arguments.workers or n_cores()
         maps = make_maps(pairs, edges, n_workers=n_workers, on_done=on_done)
     confirmation = confirm_best(maps, make_pairs(epoch=1))
-    print("\n".join(summary(maps, confirmation)))
+    show(*summary(maps, confirmation))
     if maps.n_failed:
-        print(f"{maps.n_failed} pairs did not stay finite and are left out")
+        show(f"{maps.n_failed} pairs did not stay finite and are left out")
     if table is not None:
         import json
 
@@ -134,7 +134,7 @@ def _say_unread(overrides: Sequence[str]) -> None:
         flag = NOT_READ.get(key.partition(".")[0])
         if flag is not None and key not in READ_OF_PLAN:
             note = f"{key} is not read by detectability; use {flag}"
-            print(f"diagnose: note: {note}", file=sys.stderr)
+            remark("diagnose", f"note: {note}")
 
 
 def _numbers(

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import difflib
-import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
 from diagnose.commands.parser import add_model, add_overrides, refuse_existing
 from gensig.errors import ConfigError
+from gensig.terminal.printing import remark, show
 
 HELP = """\
 Evaluate a trained network on a data set.
@@ -61,7 +61,7 @@ def run(arguments: Namespace) -> int:
         subset=values.get("subset"),
         channels=channels,
     )
-    print("\n".join(network.lines(evaluation.result)))
+    show(*network.lines(evaluation.result))
     if out is not None:
         Path(out).mkdir(parents=True, exist_ok=True)
         evaluation.write(Path(out))
@@ -75,7 +75,7 @@ def _model(given: str | None, former: str | None) -> str | None:
     if given is not None:
         raise ConfigError(f"--model and {FORMER} are both given; leave {FORMER} out")
     text = f"{FORMER}=DIR is the former spelling of --model DIR"
-    print(f"diagnose: note: {text}", file=sys.stderr)
+    remark("diagnose", f"note: {text}")
     return former
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from diagnose.commands.parser import add_model
 from gensig.errors import ConfigError, DatasetError
+from gensig.terminal.printing import show
 
 HELP = """\
 Write a trained network for other programs, and check the file against torch.
@@ -52,5 +53,5 @@ def run(arguments: Namespace) -> int:
     need_packages()
     agreement = export_onnx(open_network(arguments.model), out)
     size = out.stat().st_size / 1e3
-    print(f"{out}: {size:.0f} kB, {agreement} on windows of many levels")
+    show(f"{out}: {size:.0f} kB, {agreement} on windows of many levels")
     return 0

@@ -15,6 +15,7 @@ from diagnose.commands.parser import (
     add_tacho,
 )
 from gensig.errors import ConfigError
+from gensig.terminal.printing import show, show_text
 
 if TYPE_CHECKING:
     from diagnose.recordings.source import Source
@@ -150,14 +151,14 @@ def run(arguments: Namespace) -> int:
         result = predict_recording(network, domain, source)
         results.append({"model": str(folder), **result})
         if not arguments.json:
-            print(network.line(result) + _held_out_text(arguments, result), flush=True)
+            show(network.line(result) + _held_out_text(arguments, result))
     if arguments.json:
         import json
 
         printed: Any = results
         if len(results) == 1:
             printed = results[0]
-        print(json.dumps(printed, indent=2, allow_nan=False))
+        show_text(json.dumps(printed, indent=2, allow_nan=False))
     if any(result["out_of_distribution"] for result in results):
         return OUT_OF_DISTRIBUTION
     return 0

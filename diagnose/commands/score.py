@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+
+from gensig.terminal.printing import remark, show, show_text
 
 HELP = """\
 Score your predictions on a data set's split, by the scorer of diagnose train.
@@ -51,16 +52,13 @@ def run(arguments: Namespace) -> int:
         dataset, Path(arguments.predictions), protocol=arguments.protocol
     )
     if arguments.json:
-        print(json.dumps(result, indent=2, allow_nan=False))
+        show_text(json.dumps(result, indent=2, allow_nan=False))
         return 0
     benchmark = result["benchmark"]
     if benchmark is not None:
         for difference in benchmark["differences"]:
-            print(
-                f"diagnose: not comparable with {benchmark['name']}: {difference}",
-                file=sys.stderr,
-            )
+            remark("diagnose", f"not comparable with {benchmark['name']}: {difference}")
         if not benchmark["differences"]:
-            print(f"{benchmark['name']}: plan, splits and signals are the frozen ones")
-    print("\n".join(score_table(result)))
+            show(f"{benchmark['name']}: plan, splits and signals are the frozen ones")
+    show(*score_table(result))
     return 0

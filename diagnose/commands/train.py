@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING
 from diagnose.commands.parser import add_overrides, refuse_existing
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
+from gensig.terminal.printing import show, tell
 from gensig.terminal.warning_lines import one_line_warnings
 
 if TYPE_CHECKING:
@@ -66,13 +66,9 @@ def run(arguments: Namespace) -> int:
         return 0
     jobs = _expand(overrides, config_dir)
     for number, config in enumerate(jobs, start=1):
-        _note(f"run {number} of {len(jobs)}: {config['out']}")
+        tell(f"run {number} of {len(jobs)}: {config['out']}")
         _train_one(config)
     return 0
-
-
-def _note(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
 
 
 def _composed(overrides: Sequence[str], config_dir: str | None) -> Configuration:
@@ -118,8 +114,8 @@ def _train_one(config: Configuration) -> None:
     out = Path(settings.out)
     refuse_existing(out)
     page, lines = STUDIES[settings.task](settings, out)
-    print("\n".join(lines))
-    print(f"report: {page}")
+    show(*lines)
+    show(f"report: {page}")
 
 
 def _study_classes(settings: TrainSettings, out: Path) -> tuple[Path, list[str]]:
@@ -135,7 +131,7 @@ def _study_classes(settings: TrainSettings, out: Path) -> tuple[Path, list[str]]
     protocols, jobs = plan_study(task, settings)
     left_out = choose_protocols(task, settings.protocols)[1]
     for name, reason in baselines_left_out(task, settings, protocols).items():
-        _note(f"baseline {name} is left out of {reason}")
+        tell(f"baseline {name} is left out of {reason}")
     with _started(out, len(jobs), left_out) as on_done:
         metrics = run_study(
             task, settings, out, protocols=protocols, jobs=jobs, on_done=on_done
@@ -190,10 +186,10 @@ def _opened(settings: TrainSettings) -> tuple[Task, TrainSettings]:
     task = task_from(open_dataset(settings.data), settings)
     chosen, instead = settings_for(task, settings)
     if instead:
-        _note(instead)
+        tell(instead)
     given = replace(chosen, window_samples=settings.window_samples)
     if note := window_note(task.dataset, given):
-        _note(note)
+        tell(note)
     return task, chosen
 
 
@@ -206,6 +202,6 @@ def _started(
     from diagnose.progress import progress
 
     for name, reason in left_out.items():
-        _note(f"protocol {name} is left out: {reason}")
+        tell(f"protocol {name} is left out: {reason}")
     out.mkdir(parents=True, exist_ok=True)
     return progress(n_jobs)

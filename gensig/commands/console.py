@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from gensig.errors import ConfigError
+from gensig.terminal import printing
 
 
 def note(*texts: str) -> None:
@@ -20,12 +20,12 @@ def note(*texts: str) -> None:
 
 def remark(text: str) -> None:
     """Print one line of the command on stderr."""
-    print(f"gensig: {text}", file=sys.stderr)
+    printing.remark("gensig", text)
 
 
 def step(text: str) -> None:
     """Print at once, on stderr, the step of a long command that begins now."""
-    print(text, file=sys.stderr, flush=True)
+    printing.tell(text)
 
 
 @contextmanager

@@ -24,6 +24,7 @@ from gensig.options.files import (
     user_folder,
 )
 from gensig.options.own_options import say_read
+from gensig.terminal.printing import show, show_text
 from gensig.text import nearest
 
 VALUE_WIDTH = 34  # longer values are cut; --json has them whole
@@ -40,9 +41,9 @@ def list_options(arguments: Namespace) -> int:
         say_read()
     content, lines = _listing(arguments.what, folder)
     if arguments.json:
-        print(json.dumps(content, indent=1))
+        show_text(json.dumps(content, indent=1))
     else:
-        print("\n".join(lines))
+        show(*lines)
     return 0
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from gensig.commands.console import replaced_file
 from gensig.errors import ConfigError
+from gensig.terminal.printing import show
 
 FIGURE_TYPES = (".png", ".svg", ".pdf")
 
@@ -72,7 +73,7 @@ def write_option(target: Path, text: str) -> None:
     with replaced_file(target) as path:
         path.write_text(text, encoding="utf-8")
     group, folder = target.absolute().parent.name, target.parent.parent
-    print(f"{target}: take it with {group}={target.stem} --config-dir {folder}")
+    show(f"{target}: take it with {group}={target.stem} --config-dir {folder}")
 
 
 def write_outputs(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from gensig.commands.console import replaced_file
 from gensig.errors import ConfigError
+from gensig.terminal.printing import show, show_text
 from gensig.terminal.warning_lines import one_line_warnings
 
 WIDTH = 90  # letters of a line of a reason
@@ -39,7 +40,7 @@ def figures(arguments: Namespace) -> int:
     if folder.exists() and not folder.is_dir():
         raise ConfigError(f"--dir {folder}: a file has this name; give a folder")
     folder.mkdir(parents=True, exist_ok=True)
-    print(paper.title)
+    show(paper.title)
     for number in numbers:
         with one_line_warnings("gensig"):
             figure = paper.figures[number]()
@@ -51,6 +52,6 @@ def figures(arguments: Namespace) -> int:
             figure.write_csv(file)
         with replaced_file(stem.with_suffix(".png")) as path:
             draw_paper_figure(figure, path)
-        print(f"{stem}.png and .csv: {figure.title}")
-        print(textwrap.indent(textwrap.fill(figure.reason, WIDTH), "    "))
+        show(f"{stem}.png and .csv: {figure.title}")
+        show_text(textwrap.indent(textwrap.fill(figure.reason, WIDTH), "    "))
     return 0

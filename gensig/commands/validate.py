@@ -11,6 +11,7 @@ from typing import Any
 
 from gensig.commands.console import remark, replaced_file
 from gensig.errors import ConfigError
+from gensig.terminal.printing import show
 
 ROWS = Path(__file__).resolve().parents[2] / "tests" / "literature"
 
@@ -26,7 +27,7 @@ def validate(arguments: Namespace) -> int:
     results = verdicts.run_validation()
     if arguments.markdown:
         _write_pages(page.markdown(results), Path(arguments.markdown).parent)
-    print(*page.shortfalls(results), page.summary(results), sep="\n")
+    show(*page.shortfalls(results), page.summary(results))
     n_surprises = sum(not result.as_expected for result in results)
     if n_surprises:
         remark(f"{n_surprises} row(s) differ from what they declare")

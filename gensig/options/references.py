@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gensig.errors import ConfigError
+from gensig.text.escaping import escaped
 
 OPENING = "${"
 # ${a.b}, ${.b}, ${a[0]}, ${oc.select:a.b} and ${oc.select:a.b,2.5}
@@ -135,7 +136,7 @@ def refuse_references(value: Any, where: str) -> None:
 
 def shortened(text: str) -> str:
     """The text on one line, printable, at most 80 characters of it."""
-    line = "".join(sign if sign.isprintable() else " " for sign in text)
+    line = escaped(text)
     if len(line) > 80:
         return f"{line[:77]}..."
     return line

@@ -13,6 +13,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from gensig.terminal.printing import show_text
+
 COMMANDS = ("gensig", "diagnose")
 
 
@@ -20,7 +22,7 @@ def completion(arguments: Namespace) -> int:
     """Print the lines that make a shell complete both commands."""
     from argcomplete.shell_integration import shellcode
 
-    print(shellcode(COMMANDS, shell=arguments.shell))
+    show_text(shellcode(COMMANDS, shell=arguments.shell))
     return 0
 
 

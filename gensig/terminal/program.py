@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NoReturn
 
 from gensig.errors import ConfigError, GensigError
+from gensig.terminal.printing import remark, show_text
 from gensig.text import nearest
 
 MISTAKE, INTERRUPTED = 2, 130
@@ -66,6 +67,9 @@ class Parser(argparse.ArgumentParser):
             if name.startswith("--") and name not in self._option_string_actions:
                 self.error(f"{UNKNOWN}{word}")
         return super().parse_known_args(args, namespace)
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        show_text(message)
 
     def error(self, message: str) -> NoReturn:
         """Raise ConfigError in place of the usual message and exit."""
@@ -196,5 +200,5 @@ def guarded(program: str, run: Callable[[], int]) -> int:
 
 def complain(program: str, message: str) -> int:
     """Print one line on stderr and return the exit status of a mistake."""
-    print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
+    remark(program, message)
     return MISTAKE

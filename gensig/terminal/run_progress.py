@@ -8,6 +8,7 @@ import time
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from gensig.terminal.printing import tell
 from gensig.text.amounts import duration_text, size_text
 
 LINE_SECONDS = 5.0
@@ -150,7 +151,7 @@ class RunProgress:
         line = f"{self._n_done} of {self.n_records} records, {self.facts()}"
         if self._is_done:
             line += "; checksums, figures and card follow"
-        print(line, file=sys.stderr, flush=True)
+        tell(line)
 
     def facts(self) -> str:
         """Rate, bytes and time left, as far as they are known."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
+
+from gensig.terminal.printing import remark
+from gensig.text.escaping import one_line
 
 
 @contextmanager
@@ -20,13 +22,13 @@ def one_line_warnings(program: str) -> Iterator[None]:
     def show(
         message: Warning | str, category: type[Warning], *_details: Any, **_more: Any
     ) -> None:
-        text = " ".join(str(message).split())
+        text = one_line(str(message))
         key: object = text
         if getattr(category, "once", False):
             key = category
         if key not in seen:
             seen.add(key)
-            print(f"{program}: note: {text}", file=sys.stderr)
+            remark(program, f"note: {text}")
 
     with warnings.catch_warnings():
         warnings.simplefilter("always", UserWarning)

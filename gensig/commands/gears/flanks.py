@@ -28,6 +28,7 @@ from gensig.mesh.options import MOST_SLICES
 from gensig.options.configuration import Configuration
 from gensig.systems.registry import read_sliced_pair
 from gensig.systems.sliced_pair import SlicedPair, TransmissionError
+from gensig.terminal.printing import show
 from gensig.terminal.warning_lines import one_line_warnings
 
 TOLERATED = 0.01  # error of a pressure that is not told
@@ -58,15 +59,15 @@ def transmission_error(arguments: Namespace) -> int:
     write_outputs(arguments, content, draw)
     _print_contact_ratios(system.pair)
     orders = ", ".join(f"{value:.4f}" for value in content["harmonics_um"][:4])
-    print(f"transmission error, mean   {content['mean_um']:.4f} um")
-    print(f"peak to peak               {content['peak_to_peak_um']:.4f} um")
-    print(f"mesh orders 1 to 4         {orders} um")
-    print(f"largest line load          {content['max_line_load_n_per_mm']:.2f} N/mm")
+    show(f"transmission error, mean   {content['mean_um']:.4f} um")
+    show(f"peak to peak               {content['peak_to_peak_um']:.4f} um")
+    show(f"mesh orders 1 to 4         {orders} um")
+    show(f"largest line load          {content['max_line_load_n_per_mm']:.2f} N/mm")
     pressure = f"{content['max_contact_pressure_mpa']:.1f} MPa"
-    print(f"largest contact pressure   {pressure}{_with_error(system, pressure_error)}")
+    show(f"largest contact pressure   {pressure}{_with_error(system, pressure_error)}")
     if faults:
         _print_periods(result)
-        print(f"the fault adds             {span(content['fault_adds_um'], '.4g')} um")
+        show(f"the fault adds             {span(content['fault_adds_um'], '.4g')} um")
     return 0
 
 
@@ -160,17 +161,17 @@ def sliced_stiffness(config: Configuration, arguments: Namespace) -> int:
     write_outputs(arguments, content, draw)
     low, high = stiffness.min(), stiffness.max()
     _print_contact_ratios(pair)
-    print(f"mesh stiffness, mean       {stiffness.mean():.4e} N/m")
-    print(f"mesh stiffness, range      {low:.4e} .. {high:.4e} N/m")
-    print(f"single pair, highest       {highest(single, faulty)}")
+    show(f"mesh stiffness, mean       {stiffness.mean():.4e} N/m")
+    show(f"mesh stiffness, range      {low:.4e} .. {high:.4e} N/m")
+    show(f"single pair, highest       {highest(single, faulty)}")
     if faulty is not None:
         without = np.tile(sound.contact.stiffness, result.n_periods)
         lost = 1e2 * (1.0 - stiffness / without)
         near = single > LEAST_SHARE * single.max()
         pair_lost = 1e2 * (1.0 - faulty[near] / single[near])
         _print_periods(result)
-        print(f"the mesh loses             {span(lost, '.3g')} %")
-        print(f"faulty pair loses          {span(pair_lost, '.3g')} %")
+        show(f"the mesh loses             {span(lost, '.3g')} %")
+        show(f"faulty pair loses          {span(pair_lost, '.3g')} %")
     if hot is not None:
         print_heat(hot)
     return 0
@@ -188,14 +189,14 @@ def sound_pair(config: Configuration) -> SlicedPair:
 
 
 def _print_contact_ratios(pair: GearPair) -> None:
-    print(
+    show(
         f"contact ratio              {pair.transverse_contact_ratio:.4f} transverse, "
         f"{pair.overlap_ratio:.4f} overlap, {pair.total_contact_ratio:.4f} total"
     )
 
 
 def _print_periods(result: TransmissionError) -> None:
-    print(
+    show(
         f"mesh periods               {result.n_periods}, "
         "the first faulty tooth enters at roll 0"
     )

@@ -21,6 +21,7 @@ from gensig.systems.hot_pair import (
     stiffness_variants,
 )
 from gensig.systems.registry import read_duty
+from gensig.terminal.printing import show
 
 NAMES = {
     COLD: "cold",
@@ -97,25 +98,25 @@ def heat_content(report: HeatReport) -> dict[str, Any]:
 def print_heat(report: HeatReport) -> None:
     """Print friction heat, temperatures, and stiffness effect by effect."""
     state, variants = report.state, report.variants
-    print(f"friction heat              {state.friction_heat / 1e3:.3f} kW")
+    show(f"friction heat              {state.friction_heat / 1e3:.3f} kW")
     for name, body in _bodies(state).items():
         temperatures = f"{body.temperature[0]:.1f} .. {body.tooth:.1f}"
-        print(f"{name + ', bore to teeth':<27}{temperatures} degrees Celsius")
+        show(f"{name + ', bore to teeth':<27}{temperatures} degrees Celsius")
     flash = state.flash.max()
-    print(f"flash temperature          up to {flash:.1f} K above the teeth's")
+    show(f"flash temperature          up to {flash:.1f} K above the teeth's")
     cold = variants[COLD]
-    print(f"{'':<27}{'contact ratio':>13}{'mesh, mean':>18}{'single, highest':>28}")
+    show(f"{'':<27}{'contact ratio':>13}{'mesh, mean':>18}{'single, highest':>28}")
     for key, name in NAMES.items():
         if key in variants:
-            print(f"{name:<27}{_variant_line(variants[key], cold)}")
+            show(f"{name:<27}{_variant_line(variants[key], cold)}")
     growth = f"{state.growth.teeth_alone(report.duty.system.pair) * 1e6:.1f} um"
     if APPARENT in variants:
         text = f"force over the approach less {growth} of tooth growth; no stiffness"
-        print(f"{'':<27}apparent: {text}")
+        show(f"{'':<27}apparent: {text}")
     elif report.duty.heat.growth:
         approach = cold.approach.mean() * 1e6
         text = f"teeth grow {growth}, more than the approach of {approach:.1f} um"
-        print(f"{NAMES[APPARENT]:<27}none: {text}")
+        show(f"{NAMES[APPARENT]:<27}none: {text}")
 
 
 def _variant_line(variant: Variant, cold: Variant) -> str:

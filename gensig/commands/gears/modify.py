@@ -22,6 +22,7 @@ from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification, PairModification
 from gensig.systems.flank_optimum import Cases, Optimum, judge, optimise
 from gensig.systems.sliced_pair import SlicedPair
+from gensig.terminal.printing import show
 from gensig.terminal.warning_lines import one_line_warnings
 from gensig.units import from_si
 
@@ -67,7 +68,7 @@ def modify_flank(arguments: Namespace) -> int:
         plot_front(system, before, chosen, front, path)
 
     write_outputs(arguments, content, draw)
-    print(f"{'':<12}{'peak to peak':>14}{'line load':>16}   worst of {_cases(cases)}")
+    show(f"{'':<12}{'peak to peak':>14}{'line load':>16}   worst of {_cases(cases)}")
     _print("before", before)
     for optimum in front:
         _print(("front", "chosen")[optimum is chosen], optimum)
@@ -77,7 +78,7 @@ def modify_flank(arguments: Namespace) -> int:
 
 def _print(name: str, optimum: Optimum) -> None:
     ripple, line_load = optimum.ripple * 1e6, optimum.line_load * 1e-3
-    print(f"{name:<12}{ripple:>11.4f} um{line_load:>11.2f} N/mm")
+    show(f"{name:<12}{ripple:>11.4f} um{line_load:>11.2f} N/mm")
 
 
 def _knee(front: Sequence[Optimum], before: Optimum) -> Optimum:

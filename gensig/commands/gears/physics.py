@@ -19,6 +19,7 @@ from gensig.systems.base import Machine
 from gensig.systems.registry import SLICED
 from gensig.systems.spur_pair import SpurPair
 from gensig.systems.stiffness_curves import StiffnessCurves
+from gensig.terminal.printing import show
 
 PAPER_KIND = "sum of pair stiffnesses (secant)"
 TANGENT_KIND = "tangent dF/d(approach) at static equilibrium"
@@ -89,20 +90,20 @@ def stiffness_content(system: Machine, curves: StiffnessCurves) -> dict[str, Any
 def _print(content: dict[str, Any], curves: StiffnessCurves) -> None:
     mesh, single = curves.mesh_stiffness, curves.single_pair_stiffness
     faulty = curves.faulty_pair_stiffness
-    print(f"transverse contact ratio   {content['transverse_contact_ratio']:.5f}")
-    print(f"base pitch                 {content['base_pitch_mm']:.5f} mm")
-    print(f"mesh stiffness, mean       {mesh.mean():.4e} N/m")
-    print(f"mesh stiffness, range      {mesh.min():.4e} .. {mesh.max():.4e} N/m")
-    print(f"single pair, highest       {highest(single, faulty)}")
+    show(f"transverse contact ratio   {content['transverse_contact_ratio']:.5f}")
+    show(f"base pitch                 {content['base_pitch_mm']:.5f} mm")
+    show(f"mesh stiffness, mean       {mesh.mean():.4e} N/m")
+    show(f"mesh stiffness, range      {mesh.min():.4e} .. {mesh.max():.4e} N/m")
+    show(f"single pair, highest       {highest(single, faulty)}")
     if "long_tip_relief" in content:
         sides = ", ".join(
             f"{name} {side['tip_relief_um']:.2f} um "
             f"over {side['tip_relief_height_mm']:.2f} mm"
             for name, side in content["long_tip_relief"].items()
         )
-        print(f"tip relief for this torque {sides} of height")
+        show(f"tip relief for this torque {sides} of height")
     if faulty is not None:
         loss = 1e2 * (1.0 - faulty / single)
-        print(f"faulty pair loses          {span(loss, '.2f')} %")
+        show(f"faulty pair loses          {span(loss, '.2f')} %")
         gap = span(content["faulty_pair_gap_um"], ".3g")
-        print(f"faulty pair touches later  {gap} um")
+        show(f"faulty pair touches later  {gap} um")

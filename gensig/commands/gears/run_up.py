@@ -30,6 +30,7 @@ from gensig.signals.run_up.speed_maps import (
 from gensig.systems.base import Machine
 from gensig.systems.pair_machine import GearPairMachine, pair_dynamics
 from gensig.systems.run import Run
+from gensig.terminal.printing import show
 from gensig.units import SPEED, channel_unit, from_si
 
 ACCELERATION_REFERENCE = 1e-6  # m/s2, ISO 1683
@@ -276,7 +277,7 @@ def print_run_up(run_up: RunUp) -> None:
     orders = run_up.orders
     rpm = RPM * orders.speed
     turns = 1.0 / orders.axis[1]
-    print(
+    show(
         f"run-up of the {run_up.shaft}, {rpm[0]:.0f} to {rpm[-1]:.0f} r/min, "
         f"frames of {turns:.0f} turn(s); peaks of {run_up.channel}:"
     )
@@ -286,6 +287,6 @@ def print_run_up(run_up: RunUp) -> None:
             f"{level[index]:.1f} dB at {rpm[index]:.0f} r/min ({order * rpm[index] / 60.0:.0f} Hz)"
             for index in run_up.peaks(order)
         ]
-        print(f"  {name}: {', '.join(peaks) or 'none'}")
+        show(f"  {name}: {', '.join(peaks) or 'none'}")
     listed = ", ".join(f"{mode.name} {mode.frequency:.0f}" for mode in run_up.modes)
-    print(f"  natural frequencies, Hz: {listed or 'none'}")
+    show(f"  natural frequencies, Hz: {listed or 'none'}")

@@ -30,6 +30,7 @@ from gensig.record.simulate import Record
 from gensig.signals.run_up.level_map import decibels
 from gensig.signals.run_up.speed_maps import LEAST_CHANGE, order_map
 from gensig.systems.base import Machine
+from gensig.terminal.printing import show
 from gensig.units import channel_unit
 
 FIRST = "as configured"
@@ -155,10 +156,10 @@ def _content(variants: dict[str, Vibration]) -> dict[str, Any]:
 def _print_changes(content: dict[str, Any]) -> None:
     """Print the mean change of every variant over the speed."""
     rpm = content["speeds_rpm"]
-    print(f"run-up, {rpm[0]:.0f} to {rpm[-1]:.0f} r/min, RMS against {FIRST}:")
+    show(f"run-up, {rpm[0]:.0f} to {rpm[-1]:.0f} r/min, RMS against {FIRST}:")
     for name, total in content["total_change_db"].items():
         mesh = content["mesh_change_db"][name]
-        print(
+        show(
             f"  {name}: {np.nanmean(total):+.2f} dB on average, {np.nanmin(total):+.2f} to "
             f"{np.nanmax(total):+.2f}; mesh orders {np.nanmean(mesh):+.2f} dB"
         )

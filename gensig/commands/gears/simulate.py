@@ -36,6 +36,7 @@ from gensig.record.simulate import Record, simulate_record
 from gensig.signals.indicators import crest_factor, kurtosis, rms
 from gensig.signals.run_up.speed_maps import LEAST_CHANGE
 from gensig.systems.base import Machine
+from gensig.terminal.printing import show
 from gensig.units import channel_unit
 
 RECORD_TYPES = (".h5", ".hdf5", ".csv")
@@ -148,9 +149,9 @@ def _show(
     if arguments.orders and run_up is not None:
         with replaced_file(arguments.orders) as path:
             write_levels(run_up, path)
-    print(name or f"class {values['label_name']}, severity {values['severity']:.3f}")
+    show(name or f"class {values['label_name']}, severity {values['severity']:.3f}")
     speed, mesh = values["speed_rpm"], values["mesh_frequency_hz"]
-    print(f"speed {speed:.3f} r/min, mesh frequency {mesh:.2f} Hz")
+    show(f"speed {speed:.3f} r/min, mesh frequency {mesh:.2f} Hz")
     _print_levels(system, acceleration)
     if run_up is not None:
         print_run_up(run_up)
@@ -218,7 +219,7 @@ def _write_csv(system: Machine, acceleration: np.ndarray, path: Path) -> None:
 
 
 def _print_levels(system: Machine, acceleration: np.ndarray) -> None:
-    print(f"{'channel':<16}{'RMS':>12} {'':<8}{'kurtosis':>12}{'crest':>12}")
+    show(f"{'channel':<16}{'RMS':>12} {'':<8}{'kurtosis':>12}{'crest':>12}")
     table = zip(
         system.sensing.channel_names,
         rms(acceleration),
@@ -228,4 +229,4 @@ def _print_levels(system: Machine, acceleration: np.ndarray) -> None:
     )
     for name, level, fourth, crest in table:
         unit = channel_unit(name).replace("^", "")
-        print(f"{name:<16}{level:>12.4g} {unit:<8}{fourth:>12.3f}{crest:>12.3f}")
+        show(f"{name:<16}{level:>12.4g} {unit:<8}{fourth:>12.3f}{crest:>12.3f}")

@@ -22,6 +22,7 @@ from gensig.systems.root_strength import (
     RootStrength,
     read_root_strength,
 )
+from gensig.terminal.printing import show
 
 FACTORS = (
     "form_factor",
@@ -126,17 +127,17 @@ def _gear_content(gear: GearStress, stress: NDArray[np.float64]) -> dict[str, An
 def _print(system: RootStrength, content: dict[str, Any]) -> None:
     strength, gears = system.strength, content["gears"]
     force, torque = content["tangential_force_n"], content["torque_nm"]
-    print(f"tangential force           {force:.1f} N, {torque:.2f} N m")
+    show(f"tangential force           {force:.1f} N, {torque:.2f} N m")
     if "tangential_force_over_mesh_n" in content:
         force = content["tangential_force_over_mesh_n"]
-        print(f"over the mesh it takes     {force:.1f} N")
+        show(f"over the mesh it takes     {force:.1f} N")
     load_point = strength.load_point.replace("_", " ")
-    print(f"load point                 {load_point}, ISO 6336-3:{strength.edition}")
-    print(f"{'':<27}" + "".join(f"{name:>16}" for name in gears))
+    show(f"load point                 {load_point}, ISO 6336-3:{strength.edition}")
+    show(f"{'':<27}" + "".join(f"{name:>16}" for name in gears))
     for label, key, form in ROWS:
         cells = [f"{gear[key]:>16{form}}" for gear in gears.values()]
-        print(f"{label:<27}{''.join(cells)}")
-    print(
+        show(f"{label:<27}{''.join(cells)}")
+    show(
         f"strength {strength.name}: sigma_Flim {strength.bending_limit * 1e-6:g} MPa, "
         f"K_FN {strength.paper_life_factor:g}, "
         f"Y_ST {strength.test_gear_stress_correction:g}, "
@@ -145,7 +146,7 @@ def _print(system: RootStrength, content: dict[str, Any]) -> None:
         f"Y_R {strength.relative_surface_factor:g}, "
         f"Y_X {content['size_factor']:g}, Y_M {strength.mean_stress_factor:g}"
     )
-    print(
+    show(
         f"load factors: K_A {strength.application_factor:g}, "
         f"K_gamma {strength.mesh_load_factor:g}, K_v {strength.dynamic_factor:g}, "
         f"K_F_beta {strength.face_load_factor:g}, "

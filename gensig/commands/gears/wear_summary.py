@@ -10,6 +10,7 @@ import numpy as np
 
 from gensig.life.life_laws import FittedLaw, LifeMap
 from gensig.life.options import SIDES
+from gensig.terminal.printing import show
 
 
 def print_wear_life(
@@ -24,17 +25,17 @@ def print_wear_life(
     rule, sharing, geometry = content["rule"], content["sharing"], content["geometry"]
     life, turns = content["life_hours"], content["life_turns"]
     deepest = content["deepest"]
-    print(f"rule                       {rule}, sharing {sharing}, geometry {geometry}")
-    print(f"contact ratio              {content['transverse_contact_ratio']:.4f}")
-    print(f"pressure angle, A to E     {ends('pressure_angle_deg')} deg on the pinion")
+    show(f"rule                       {rule}, sharing {sharing}, geometry {geometry}")
+    show(f"contact ratio              {content['transverse_contact_ratio']:.4f}")
+    show(f"pressure angle, A to E     {ends('pressure_angle_deg')} deg on the pinion")
     sliding = ends("sliding_velocity_mm_per_s")
-    print(f"sliding, A to E            {sliding} mm/s, 0 at the pitch point")
-    print(f"contact pressure, A to E   {ends('contact_pressure_mpa')} MPa, new flanks")
+    show(f"sliding, A to E            {sliding} mm/s, 0 at the pitch point")
+    show(f"contact pressure, A to E   {ends('contact_pressure_mpa')} MPa, new flanks")
     for name in SIDES:
         wear = ends(f"{name}_wear_per_mesh_nm")
-        print(f"{name:<6} wear, A to E       {wear} nm a mesh, new flanks")
-    print(f"life                       {life:.5g} h, {turns:.5g} turns of the pinion")
-    print(
+        show(f"{name:<6} wear, A to E       {wear} nm a mesh, new flanks")
+    show(f"life                       {life:.5g} h, {turns:.5g} turns of the pinion")
+    show(
         f"ended by                   {content['ended_by'].replace('_', ' ')}, "
         f"{content['threshold_um']:.4g} um "
         f"({deepest['gear']}, {deepest['position_mm']:.3f} mm from A)"
@@ -44,7 +45,7 @@ def print_wear_life(
         _print_vibration(content["vibration"], content["threshold_um"])
     if content["torque_exponent"] is not None:
         exponent = content["torque_exponent"]
-        print(f"local law                  life ~ torque^-{exponent:.3f} speed^-1")
+        show(f"local law                  life ~ torque^-{exponent:.3f} speed^-1")
     if lives is not None:
         _print_map(lives)
     for law in laws:
@@ -56,7 +57,7 @@ def _print_error_limit(content: Mapping[str, Any]) -> None:
     limit = content["transmission_error_limit_um"]
     if limit is not None and content["ended_by"] != "transmission_error":
         error = content["history"]["transmission_error_peak_to_peak_um"][-1]
-        print(
+        show(
             f"transmission error         {error:.4g} um from peak to peak at the end; "
             f"limit of {limit:g} um not reached"
         )
@@ -73,7 +74,7 @@ def _print_vibration(vibration: Mapping[str, Any], threshold_um: float) -> None:
     if not vibration["is_reached"]:
         reached = "not reached"
     rise = max(vibration["rise_db"][end])
-    print(
+    show(
         f"vibration                  {rms[0].max():.4g} m/s2 RMS with new flanks, "
         f"loudest sensor; at the end {rms[end].max():.4g}, up by {rise:.3g} dB at most; "
         f"limit of {limits} {reached}"
@@ -82,10 +83,10 @@ def _print_vibration(vibration: Mapping[str, Any], threshold_um: float) -> None:
 
 def _print_map(lives: LifeMap) -> None:
     heads = [f"{speed * 30.0 / math.pi:>11.4g}" for speed in lives.speed]
-    print(f"{'life, h':<10}{''.join(heads)} r/min")
+    show(f"{'life, h':<10}{''.join(heads)} r/min")
     for torque, row in zip(lives.torque, lives.hours, strict=True):
         cells = [f"{value:>11.4g}" for value in row]
-        print(f"{torque:>6.4g} N m{''.join(cells)}")
+        show(f"{torque:>6.4g} N m{''.join(cells)}")
 
 
 def _print_law(law: FittedLaw) -> None:
@@ -96,4 +97,4 @@ def _print_law(law: FittedLaw) -> None:
     )
     if law.no_life_from is not None:
         line += f"; no life from {law.no_life_from:.4g} N m on"
-    print(line)
+    show(line)

@@ -22,6 +22,7 @@ from gensig.driveline.time_root_stress import typical_largest
 from gensig.errors import ConfigError
 from gensig.life.root.strength import RELIABILITY, reliability
 from gensig.options.configuration import Configuration
+from gensig.terminal.printing import show
 from gensig.units import from_si, to_si
 
 LONGEST_TIME = 60.0  # s
@@ -152,7 +153,7 @@ def root_content(
 def print_in_time(content: Mapping[str, Any]) -> None:
     """Print the summary of ``--time``."""
     residual = content["time_energy_residual"]
-    print(f"in time, teeth free to part (energy residual {residual:.1g}):")
+    show(f"in time, teeth free to part (energy residual {residual:.1g}):")
     nodes = zip(
         content["shown_nodes"],
         content["time_typical_fluctuation_rpm"],
@@ -161,7 +162,7 @@ def print_in_time(content: Mapping[str, Any]) -> None:
         strict=True,
     )
     for node, typical, whole, cycle in nodes:
-        print(
+        show(
             f"  node {node:>3} +- {typical:.2f} r/min in a cycle, {whole:.2f} in all, "
             f"{cycle:.2f} of the mean cycle"
         )
@@ -176,7 +177,7 @@ def print_in_time(content: Mapping[str, Any]) -> None:
         strict=True,
     )
     for name, least, greatest, low, high, apart, back in meshes:
-        print(
+        show(
             f"  mesh {name:>6} {least:7.0f} .. {greatest:.0f} N in a cycle, "
             f"{low:.0f} .. {high:.0f} in all, "
             f"apart {apart:.1%}, on the back flanks {back:.1%}"
@@ -186,24 +187,24 @@ def print_in_time(content: Mapping[str, Any]) -> None:
 def print_roots(content: Mapping[str, Any]) -> None:
     """Print the summary of ``--mesh``."""
     roots, mesh = content["root_stress"], content["root_stress_mesh"]
-    print(f"root stress of mesh {mesh}, {roots['linear']['decisive_gear']}:")
+    show(f"root stress of mesh {mesh}, {roots['linear']['decisive_gear']}:")
     for name, root in roots.items():
         change, stress = "", root["iso_root_stress_mpa"]
         if name + WITHOUT in roots:
             before = roots[name + WITHOUT]["iso_root_stress_mpa"]
             change = f", {stress / before - 1.0:+.1%} by the dampers"
-        print(
+        show(
             f"  {name.replace('_', ' '):<24} {root['greatest_tooth_force_n']:7.0f} N, "
             f"{stress:.1f} MPa by ISO 6336-3, "
             f"{root['largest_root_stress_mpa']:.1f} over the mesh{change}"
         )
         paper, iso = root["safety_factor_paper"], root["safety_factor_iso"]
-        print(
+        show(
             f"  {'':<24} safety {paper:.3f} ({root['reliability_paper']}) by the paper, "
             f"{iso:.3f} ({root['reliability_iso']}) by ISO 6336-3"
         )
     classes = [f"{rank.name} from {rank.least_safety:.2f} on" for rank in RELIABILITY]
-    print(f"  reliability: {', '.join(classes)}")
+    show(f"  reliability: {', '.join(classes)}")
 
 
 def print_sweep(content: Mapping[str, Any]) -> None:
@@ -213,9 +214,7 @@ def print_sweep(content: Mapping[str, Any]) -> None:
         content["sweep_seconds_each_way"],
         content["sweep_energy_residual"],
     )
-    print(
-        f"sweep up and down, {seconds:g} s each way (energy residual {residual:.1g}):"
-    )
+    show(f"sweep up and down, {seconds:g} s each way (energy residual {residual:.1g}):")
     nodes = zip(
         content["shown_nodes"],
         content["sweep_up"]["speed_fluctuation_rpm"],
@@ -226,7 +225,7 @@ def print_sweep(content: Mapping[str, Any]) -> None:
         strict=True,
     )
     for node, up, down, apart, most, speed in nodes:
-        print(
+        show(
             f"  node {node:>3} +- up to {max(up):.1f} r/min going up, "
             f"{max(down):.1f} going down; up less down at most {most:+.0%}, "
             f"at {speed:.0f} r/min; told apart at {sum(apart)} of {n_speeds} speeds"

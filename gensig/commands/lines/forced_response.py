@@ -45,6 +45,7 @@ from gensig.driveline.linear.forced import (
 from gensig.driveline.time_root_stress import root_stress_in_time
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
+from gensig.terminal.printing import show
 from gensig.units import from_si, to_si
 
 CYCLE_POINTS = 5760
@@ -253,11 +254,11 @@ def _print(content: dict[str, Any]) -> None:
     point = f"{content['speed_rpm']:g} r/min, {content['torque_nm']:.6g} N m"
     if "indicated_torque_nm" in content:
         indicated, peak = content["indicated_torque_nm"], content["peak_pressure_mpa"]
-        print(
+        show(
             f"{point} at the crank, {indicated:.5g} N m indicated, peak {peak:.4g} MPa"
         )
     else:
-        print(f"{point} of the load at the motor")
+        show(f"{point} of the load at the motor")
     nodes = zip(
         content["node_numbers"],
         content["nodes"],
@@ -268,9 +269,9 @@ def _print(content: dict[str, Any]) -> None:
     rows = {number: row for number, *row in nodes}
     for number in content["shown_nodes"]:
         name, mean, half = rows[number]
-        print(f"  node {number:>3} {name:<34} {mean:8.1f} r/min +- {half:.2f}")
+        show(f"  node {number:>3} {name:<34} {mean:8.1f} r/min +- {half:.2f}")
     for name, value in content["toothed_wheel_fluctuation_rpm"].items():
-        print(f"  toothed wheel {name} shows +- {value:.2f} r/min")
+        show(f"  toothed wheel {name} shows +- {value:.2f} r/min")
     forces = zip(
         content["meshes"],
         content["least_tooth_force_n"],
@@ -282,7 +283,7 @@ def _print(content: dict[str, Any]) -> None:
         line = f"  mesh {name:>6} {low:9.0f} .. {high:.0f} N, mean {mean:.0f} N"
         if min(low * mean, high * mean) < 0.0:
             line += " (would part)"
-        print(line)
+        show(line)
     if "time_energy_residual" in content:
         print_in_time(content)
     if "root_stress" in content:

@@ -18,6 +18,7 @@ from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.options.configuration import Configuration
 from gensig.systems.registry import LINE, read_system
+from gensig.terminal.printing import show
 
 SHOWN = 12  # modes in the summary
 MOST_MOTIONS = 3  # of a mode in the summary
@@ -95,7 +96,7 @@ def _print_sizes(line: DriveLine, content: Mapping[str, Any]) -> None:
         "rigid mode(s)": content["n_rigid_modes"],
     }
     sizes = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-    print(f"{content['system']}: {sizes}")
+    show(f"{content['system']}: {sizes}")
 
 
 def _print_modes(line: DriveLine, modes: Modes, content: Mapping[str, Any]) -> None:
@@ -104,7 +105,7 @@ def _print_modes(line: DriveLine, modes: Modes, content: Mapping[str, Any]) -> N
     if len(motions) > n_nodes:
         motions[:n_nodes] = [f"{name} rotation" for name in motions[:n_nodes]]
     frequencies = content["natural_frequencies_hz"]
-    print(f"{'mode':>4} {'Hz':>10} {'damping':>8}  kinetic energy")
+    show(f"{'mode':>4} {'Hz':>10} {'damping':>8}  kinetic energy")
     for mode, frequency in enumerate(frequencies[:SHOWN]):
         share = modes.kinetic_share[mode]
         largest = np.argsort(-share, kind="stable")[:MOST_MOTIONS]
@@ -119,9 +120,9 @@ def _print_modes(line: DriveLine, modes: Modes, content: Mapping[str, Any]) -> N
         elif strain > 0.5:
             text += f"; {strain:.0%} of the strain in a mesh"
         damping = content["damping_ratio"][mode]
-        print(f"{mode:>4} {frequency:>10.2f} {damping:>8.4f}  {text}")
+        show(f"{mode:>4} {frequency:>10.2f} {damping:>8.4f}  {text}")
     n_more = len(frequencies) - SHOWN
     if n_more > 0:
-        print(
+        show(
             f"and {n_more} more, up to {frequencies[-1]:.0f} Hz; --json FILE has them all"
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -13,6 +12,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from gensig.commands.console import step
 from gensig.commands.figures.damper_figure import plot_dampers
 from gensig.commands.lines.results import (
     RPM,
@@ -41,6 +41,7 @@ from gensig.driveline.linear.damper_tuning import tune_dampers
 from gensig.driveline.linear.dampers import TorsionalDamper
 from gensig.errors import ConfigError
 from gensig.systems.root_strength import RootStrength
+from gensig.terminal.printing import show
 from gensig.units import from_si, to_si
 
 Array = NDArray[np.float64]
@@ -84,9 +85,7 @@ def tune_damper(arguments: Namespace) -> int:
         drive = line.drive
         most = [drive.line.nodes[drive.numbers.index(node)].inertia for node in nodes]
     names = ", ".join(map(str, nodes))
-    print(
-        f"searching for dampers on nodes {names}; this takes a minute", file=sys.stderr
-    )
+    step(f"searching for dampers on nodes {names}; this takes a minute")
     result = tune_dampers(seen, most, viscous=arguments.viscous, seed=arguments.seed)
     dampers = tuple(_rounded(damper) for damper in result)
     strength = read_mesh_strength(config, line, mesh)
@@ -205,13 +204,13 @@ def _state_content(state: DamperState) -> dict[str, Any]:
 
 def _print(content: Mapping[str, Any]) -> None:
     for damper in content["dampers"]:
-        print(
+        show(
             f"node {damper['node']:>3}: ring {damper['ring_inertia_kg_m2']:g} kg m2, "
             f"{damper['damping_nms_per_rad']:g} N m s/rad, "
             f"{damper['stiffness_nm_per_rad']:g} N m/rad"
         )
     head = f"mesh {content['mesh']}, {content['torque_nm']:g} N m at the crank"
     before, after = content["before"], content["after"]
-    print(f"{head:<36}{'before':>12}{'after':>12}")
+    show(f"{head:<36}{'before':>12}{'after':>12}")
     for label, key, form in ROWS:
-        print(f"{label:<36}{before[key]:>12{form}}{after[key]:>12{form}}")
+        show(f"{label:<36}{before[key]:>12{form}}{after[key]:>12{form}}")

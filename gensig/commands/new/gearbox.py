@@ -24,6 +24,7 @@ from gensig.commands.new.option_files import (
 from gensig.commands.new.staged_gearbox import new_staged, read_staged_sheet
 from gensig.commands.new.tip_relief import modification_text
 from gensig.errors import ConfigError
+from gensig.terminal.printing import show, show_text
 
 GROUPS = ("gear", "modification", "experiment")  # written in this order
 N_TEETH = (2, 4, 6)  # two gears a stage
@@ -84,21 +85,21 @@ def new(arguments: Namespace) -> int:
     if level is not None:
         content["healthy_level"] = level.content()
     if arguments.json:
-        print(json.dumps(content))
+        show_text(json.dumps(content))
         return 0
     *first, last = content["files"]
-    print(f"wrote {', '.join(first)} and {last}; each line there says where it is from")
-    print("with the gears as given it follows:")
+    show(f"wrote {', '.join(first)} and {last}; each line there says where it is from")
+    show("with the gears as given it follows:")
     for key, value in content["derived"].items():
         text = "-"
         if value is not None:
             text = format(value, ".4g")
-        print(f"  {key:<32}{text}")
+        show(f"  {key:<32}{text}")
     for side, bearing in content["bearings"].items():
-        print(f"  {side + '_bearings':<32}{bearing}")
+        show(f"  {side + '_bearings':<32}{bearing}")
     if level is not None:
-        print(*level.lines(), sep="\n")
-    print("next:", *content["next"], sep="\n  ")
+        show(*level.lines())
+    show("next:", *[f"  {line}" for line in content["next"]])
     return 0
 
 
@@ -142,7 +143,7 @@ def _ask(question: str, counts: Sequence[int], *, needed: bool) -> Any:
             numbers = []
         if len(numbers) in counts:
             return numbers
-        print(f"give {_counts(counts)} number{'s' * (max(counts) > 1)}")
+        show(f"give {_counts(counts)} number{'s' * (max(counts) > 1)}")
 
 
 def _typed_line(question: str) -> str:
@@ -150,7 +151,7 @@ def _typed_line(question: str) -> str:
     try:
         return input(f"{question}: ")
     except EOFError:
-        print()  # the cursor stands behind the question
+        show("")  # the cursor stands behind the question
         raise ConfigError(
             f"the input ended before an answer to '{question}'; nothing is written"
         ) from None

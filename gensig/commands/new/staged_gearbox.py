@@ -31,6 +31,7 @@ from gensig.commands.new.stages import (
 )
 from gensig.errors import ConfigError
 from gensig.geometry.bearing_sizes import bearing_for
+from gensig.terminal.printing import show, show_text
 
 GROUPS = ("system", "experiment")  # written in this order
 TABLES = ("shafting", "gears")
@@ -152,12 +153,12 @@ def new_staged(sheet: StagedSheet, arguments: Namespace) -> int:
     if level is not None:
         content["healthy_level"] = level.content()
     if arguments.json:
-        print(json.dumps(content))
+        show_text(json.dumps(content))
         return 0
     _print(content)
     if level is not None:
-        print(*level.lines(), sep="\n")
-    print("next:", *content["next"], sep="\n  ")
+        show(*level.lines())
+    show("next:", *[f"  {line}" for line in content["next"]])
     return 0
 
 
@@ -208,16 +209,16 @@ def _torsional_stress(torque: float, diameter_mm: float) -> float:
 
 def _print(content: dict[str, Any]) -> None:
     *files, last = content["files"]
-    print(f"wrote {', '.join(files)} and {last}; each says where its values are from")
-    print("with the gears as given it follows:")
+    show(f"wrote {', '.join(files)} and {last}; each says where its values are from")
+    show("with the gears as given it follows:")
     for key, value in content["derived"].items():
-        print(f"  {key:<32}{value:.4g}")
+        show(f"  {key:<32}{value:.4g}")
     for key, values in content["stages"].items():
         texts = ["-" if value is None else f"{value:.4g}" for value in values]
-        print(f"  {key:<32}{'  '.join(f'{text:<10}' for text in texts)}".rstrip())
+        show(f"  {key:<32}{'  '.join(f'{text:<10}' for text in texts)}".rstrip())
     for number, shaft in enumerate(content["shafts"], start=1):
         numbers = (
             f"{shaft['speed_rpm']:.4g} r/min, {shaft['torque_nm']:.4g} N m, "
             f"{shaft['diameter_mm']:g} mm at {shaft['torsional_stress_mpa']:.3g} MPa"
         )
-        print(f"  {f'shaft {number}':<32}{numbers}, {shaft['bearing']}")
+        show(f"  {f'shaft {number}':<32}{numbers}, {shaft['bearing']}")

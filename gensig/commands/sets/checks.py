@@ -8,23 +8,23 @@ from pathlib import Path
 from gensig.dataset.folder.inspection import inspect as inspect_path
 from gensig.dataset.folder.verify import verify as verify_folder
 from gensig.errors import ConfigError
+from gensig.terminal.printing import show, show_text
 
 
 def verify(arguments: Namespace) -> int:
     """Print every problem of a data set; the exit status is 0 for a whole and unaltered one."""
     folder, depth = arguments.folder, "every byte"
     result = verify_folder(Path(folder), quick=arguments.quick)
-    for problem in result.problems:
-        print(problem)
+    show(*result.problems)
     if result.problems:
-        print(f"{folder} is NOT whole: {len(result.problems)} problem(s)")
+        show(f"{folder} is NOT whole: {len(result.problems)} problem(s)")
         return 1
     if arguments.quick:
         depth = "sizes and manifest"
     records = f"{result.n_records} records"
     if result.n_failed:
         records += f", {result.n_failed} marked failed"
-    print(f"{folder} is whole and unaltered ({depth} checked): {records}")
+    show(f"{folder} is whole and unaltered ({depth} checked): {records}")
     return 0
 
 
@@ -38,24 +38,24 @@ def reproduce(arguments: Namespace) -> int:
     result = reproduce_records(Path(arguments.folder), arguments.records)
     for name, (recorded, present) in result.other.items():
         recorded, present = recorded or "unknown", present or "unknown"
-        print(f"made with {name} {recorded}, here is {present}")
+        show(f"made with {name} {recorded}, here is {present}")
     line = f"{result.n_equal} of {result.n_records} records have the same bits"
     if result.n_failed:
         line += (
             f"; {result.n_failed} failed again for the same reason and hold no signal"
         )
-    print(line)
+    show(line)
     if result.worst:
         accepted = "here every bit must agree"
         if result.other:
             accepted = f"{ACCEPTED:g} is accepted"
         largest, worst = result.largest, result.worst
-        print(f"largest difference {largest:.2g} of the record's RMS, in {worst}")
-        print(f"{result.n_refused} record(s) NOT reproduced; {accepted}")
+        show(f"largest difference {largest:.2g} of the record's RMS, in {worst}")
+        show(f"{result.n_refused} record(s) NOT reproduced; {accepted}")
     return int(result.n_refused > 0)
 
 
 def inspect(arguments: Namespace) -> int:
     """Print what a data set or an HDF5 file holds."""
-    print(inspect_path(Path(arguments.path)))
+    show_text(inspect_path(Path(arguments.path)))
     return 0

@@ -20,6 +20,7 @@ from gensig.errors import ConfigError
 from gensig.options.compose import override_keys
 from gensig.options.configuration import Configuration
 from gensig.plan.request import STORED_FLAG, Request, read_request
+from gensig.terminal.printing import show, show_text
 
 if TYPE_CHECKING:
     from gensig.dataset.plan import Plan
@@ -187,14 +188,14 @@ def finalize(arguments: Namespace) -> int:
     accepted = accept_edits(out)
     require_whole(out)
     if accepted:
-        print(f"{out}: accepted as it is now: {', '.join(accepted)}")
+        show(f"{out}: accepted as it is now: {', '.join(accepted)}")
     return _print_complete(out, manifest.n_failed, manifest.n_records)
 
 
 def _print_complete(out: Path, n_failed: int, n_records: int) -> int:
     """Print that a folder is complete, and return its exit status."""
     print_failed(out, n_failed, n_records)
-    print(f"{out} is complete: {n_records} records")
+    show(f"{out} is complete: {n_records} records")
     return int(n_failed > 0)
 
 
@@ -212,7 +213,7 @@ def plan(arguments: Namespace) -> int:
         refuse_used(_parent(jobs))
     for number, job in enumerate(jobs):
         if job.name:
-            print("\n" * (number > 0) + job.name, flush=True)
+            show(*[""] * (number > 0), job.name)
         _plan(job, freeze=arguments.freeze)
     return 0
 
@@ -221,8 +222,8 @@ def _show_configurations(jobs: Sequence[Job]) -> int:
     """Print the configuration of each data set as its ``config.yaml`` would hold it."""
     for job in jobs:
         if job.name:
-            print(f"--- # {job.name}")
-        print(config_text(job.request.config.with_entries(out=None).plain()), end="")
+            show(f"--- # {job.name}")
+        show_text(config_text(job.request.config.with_entries(out=None).plain()))
     return 0
 
 
@@ -235,7 +236,7 @@ def _plan(job: Job, *, freeze: bool) -> None:
     config, out = job.request.config, job.folder
     if freeze and out is not None:
         begin_folder(config, job.request.overrides, out)
-        print(
+        show(
             f"{out} is planned; gensig resume {out} makes it here, "
             "tasks with executor=slurm as an array job"
         )
@@ -246,5 +247,5 @@ def _plan(job: Job, *, freeze: bool) -> None:
         step(f"making {n_timed} of {table.n_records} records to time them")
 
     for name, value in predict(config, on_plan=on_plan).items():
-        indented = value.replace("\n", f"\n{'':<11}")
-        print(f"{name:<11}{indented}")
+        first, *others = value.split("\n")
+        show(f"{name:<11}{first}", *[f"{'':<11}{other}" for other in others])

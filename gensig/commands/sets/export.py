@@ -8,6 +8,7 @@ from pathlib import Path
 from gensig.dataset.exports.export import HUGGING_FACE
 from gensig.dataset.exports.export import export as export_folder
 from gensig.report.document import write_report
+from gensig.terminal.printing import show
 
 
 def export(arguments: Namespace) -> int:
@@ -21,13 +22,13 @@ def export(arguments: Namespace) -> int:
         one_channel=arguments.one_channel,
         protocols=arguments.protocol,
     )
-    print(
+    show(
         f"{arguments.out}: {made['records']} records as {arguments.to}, "
         f"{made['files']} file(s), {made['bytes']} bytes"
     )
     if arguments.to == HUGGING_FACE:
         for folder in sorted((out / "data").iterdir()):
-            print(f"datasets.load_dataset({str(out)!r}, {folder.name!r})")
+            show(f"datasets.load_dataset({str(out)!r}, {folder.name!r})")
     return 0
 
 
@@ -37,5 +38,5 @@ def report(arguments: Namespace) -> int:
     if arguments.out:
         out = Path(arguments.out).expanduser()
     path, text = write_report(Path(arguments.folder), out, per_class=arguments.records)
-    print(f"{path}: {text}; open it in a browser")
+    show(f"{path}: {text}; open it in a browser")
     return 0

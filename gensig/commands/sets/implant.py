@@ -15,6 +15,7 @@ from gensig.implants.implant_folder import HERE, begin_implants
 from gensig.implants.implant_sources import ImplantSources, open_implanter
 from gensig.implants.implanting import Implanter
 from gensig.implants.options import ImplantOptions
+from gensig.terminal.printing import show
 
 OUT_WORD = "out="
 NEEDED = {"healthy": "--healthy", "teeth": "--teeth", "speed_rpm": "--speed-rpm"}
@@ -43,7 +44,7 @@ def implant(arguments: Namespace) -> int:
         )
     if not (arguments.quiet or status):
         for line in held_out_lines(implanter.cut.blocks):
-            print(line)
+            show(line)
     return status
 
 

@@ -13,23 +13,23 @@ from gensig.measured.found_table import hash_lines, known_lines, set_lines
 from gensig.measured.loading import load, sets
 from gensig.measured.measured_set import MeasuredRecording, MeasuredSet
 from gensig.measured.measured_signal import read_signal
+from gensig.terminal.printing import show, show_text
 
 
 def measured(arguments: Namespace) -> int:
     """Print the known sets, or what a folder holds of one."""
     words = list(arguments.words)
     if not words:
-        print("\n".join(known_lines()))
+        show(*known_lines())
         return 0
     found = open_set(words)
     if arguments.json:
-        print(json.dumps(_plain(found), indent=2))
+        show_text(json.dumps(_plain(found), indent=2))
         return 0
-    print("\n".join(set_lines(found)))
-    print("\nsha256 of what was read:")
-    print("\n".join(hash_lines(found, whole=arguments.hashes)))
-    for line in _first_lines(found):
-        print(line)
+    show(*set_lines(found))
+    show("", "sha256 of what was read:")
+    show(*hash_lines(found, whole=arguments.hashes))
+    show(*_first_lines(found))
     return 0
 
 
@@ -62,8 +62,9 @@ def _first_lines(found: MeasuredSet) -> list[str]:
             continue
         signal = read_signal(first)
         n_samples = signal.acceleration.shape[1]
+        lines.append("")
         lines.append(
-            f"\n{first.name}: {len(signal.sensors)} channel(s) {', '.join(signal.sensors)}, "
+            f"{first.name}: {len(signal.sensors)} channel(s) {', '.join(signal.sensors)}, "
             f"{n_samples} samples, {signal.duration:.3g} s"
         )
     return lines

@@ -13,6 +13,7 @@ from gensig.dataset.folder.failures import commonest, failure_reasons
 from gensig.dataset.folder.manifest import read_manifest
 from gensig.errors import Interrupted
 from gensig.options.configuration import Configuration
+from gensig.terminal.printing import show
 from gensig.terminal.run_progress import RunProgress
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def run(
         return 1
     print_failed(out, n_failed, n_records)
     if not arguments.quiet:
-        print(f"{out}: {records} in {time.monotonic() - begin:.1f} s; {following}")
+        show(f"{out}: {records} in {time.monotonic() - begin:.1f} s; {following}")
     # A task of an array job has done its work; finalize answers for the whole folder.
     return int(n_failed > 0 and not of_task)
 

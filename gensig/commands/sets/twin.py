@@ -16,6 +16,7 @@ from gensig.plan.request import read_request
 from gensig.signals.mesh_motion import Teeth
 from gensig.signals.recording import Recording
 from gensig.systems.registry import SIDES, read_system
+from gensig.terminal.printing import show
 from gensig.twin.check import check, held_out_duration
 from gensig.twin.fitting import fit
 from gensig.twin.machine_recording import read_recording
@@ -66,9 +67,9 @@ def twin(arguments: Namespace) -> int:
     (out / "report.md").write_text(text, encoding="utf-8")
     plot_twin(fitted, result, out / "report.png")
     for key, value in fitted_rows(fitted, teeth.driving):
-        print(f"{key:<16}{value}")
-    print(*check_summary(result), verdict(result), sep="\n")
-    print(
+        show(f"{key:<16}{value}")
+    show(*check_summary(result), verdict(result))
+    show(
         f"{out}/report.md has it all; gensig generate --config-dir {out} "
         f"experiment={name} out=runs/{name}"
     )

@@ -11,6 +11,7 @@ from gensig.dataset.reader import Dataset, open_dataset
 from gensig.dataset.storage.attributes import HDF5_ERRORS, read_attributes
 from gensig.dataset.storage.guard import holds_its_data, open_file
 from gensig.errors import DatasetError
+from gensig.text.escaping import escaped
 
 WIDTH = 100
 OBJECTS_LIMIT = 500
@@ -164,7 +165,7 @@ def _show(value: object) -> str:
 
     Text from files cannot steer the terminal.
     """
-    text = "".join(c if c.isprintable() else "?" for c in str(value))
+    text = escaped(str(value))
     if len(text) > WIDTH:
         return f"{text[: WIDTH - 3]}..."
     return text

@@ -8,11 +8,12 @@ from pathlib import Path
 
 from gensig.dataset.folder.environment import now
 from gensig.dataset.folder.layout import LOG
+from gensig.text.escaping import one_line
 
 
 def log(folder: Path, text: str) -> None:
     """Append one line; a disk that refuses it stops nothing, because the log decides nothing."""
-    line = f"{now()} {' '.join(text.split())}\n"
+    line = f"{now()} {one_line(text)}\n"
     flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW
     with (
         suppress(OSError),

@@ -20,6 +20,7 @@ import numpy as np
 
 from gensig.errors import ConfigError
 from gensig.signals.reading.recording_files import Content
+from gensig.text.escaping import escaped
 from gensig.text.user_file import MOST_BYTES
 
 CODE = (
@@ -193,7 +194,7 @@ def _end(status: int, is_late: bool, limits: Limits) -> str:
 
 def _one_line(text: str) -> str:
     """The text on one printable line of moderate length."""
-    line = "".join(sign if sign.isprintable() else " " for sign in str(text))
+    line = escaped(str(text))
     if len(line) > LONGEST_MESSAGE:
         return f"{line[: LONGEST_MESSAGE - 3]}..."
     return line
