@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from diagnose.networks.network import SiteNetwork
 from diagnose.recordings.accused import accused_of_turns
 from diagnose.recordings.registry import open_network
 from diagnose.report.tooth_figure import tooth_figure
+from gensig.text.csv_tables import read_records
 
 if TYPE_CHECKING:
     from diagnose.data.windows import Task
@@ -92,13 +92,13 @@ def shown(answered: Sequence[Answered]) -> list[Answered]:
 
 def _answers(path: Path, trained: tuple[str, str, str]) -> list[Answered]:
     """Answers of one training, in the order of the records."""
-    with path.open(encoding="utf-8") as file:
+    with path.open(newline="", encoding="utf-8") as file:
         return [
             Answered(
                 record_id=row["record_id"],
                 truth=row["label"],
                 answer=row["predicted"],
             )
-            for row in csv.DictReader(file)
+            for row in read_records(file)
             if (row["protocol"], row["method"], row["seed"]) == trained
         ]

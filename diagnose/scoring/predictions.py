@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gensig.text.csv_tables import write_rows
 
 if TYPE_CHECKING:
     from diagnose.data.windows import FloatArray, IntArray, Task
@@ -89,18 +90,17 @@ def write_predictions(
     known = [name for name in CONDITION_COLUMNS if name in dataset.column_names]
     columns = {name: np.asarray(dataset.column(name)) for name in ("record_id", *known)}
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(
-            ["protocol", "method", "seed", *columns, "label", "predicted"]
-            + [f"log_probability_{name}" for name in task.class_names]
-        )
+        scores = [f"log_probability_{name}" for name in task.class_names]
+        head = ["protocol", "method", "seed", *columns, "label", "predicted", *scores]
+        write_rows(file, [head])
         for prediction in predictions:
             trained = [prediction.protocol, prediction.method, prediction.seed]
             rows = (prediction.record, prediction.predicted, prediction.log_probability)
             for record, label, scores in zip(*rows, strict=True):
-                writer.writerow(
-                    trained
-                    + [column[record] for column in columns.values()]
-                    + [task.class_names[labels[record]], task.class_names[label]]
-                    + [f"{score:.5g}" for score in scores]
-                )
+                row = [
+                    *trained,
+                    *[column[record] for column in columns.values()],
+                    *[task.class_names[labels[record]], task.class_names[label]],
+                    *[f"{score:.5g}" for score in scores],
+                ]
+                write_rows(file, [row])

@@ -20,6 +20,7 @@ from diagnose.studies.protocol_results import is_leaky, score_predictions
 from diagnose.studies.result_files import Content, Entry, sha256
 from gensig.dataset.folder.layout import PLAN, SPLITS
 from gensig.errors import ConfigError, DatasetError
+from gensig.text.csv_tables import read_rows
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
@@ -220,9 +221,7 @@ def _rows(path: Path) -> list[dict[str, str]]:
         )
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file, strict=True)
-            names = reader.fieldnames or ()
-            rows = list(reader)
+            names, *cells = [row for row in read_rows(file) if row] or [[]]
     except (UnicodeDecodeError, csv.Error) as error:
         raise DatasetError(f"{path} is no CSV file in UTF-8: {error}") from None
     for name in REQUIRED:
@@ -230,11 +229,11 @@ def _rows(path: Path) -> list[dict[str, str]]:
             raise DatasetError(
                 f"{path} has no column {name}; it needs {' and '.join(REQUIRED)}"
             )
-    if not rows:
+    if not cells:
         raise DatasetError(f"{path} has no rows")
-    if any(None in row or None in row.values() for row in rows):
+    if any(len(row) != len(names) for row in cells):
         raise DatasetError(f"{path}: its rows have not all as many cells as its head")
-    return rows
+    return [dict(zip(names, row, strict=True)) for row in cells]
 
 
 def score_table(result: Content) -> list[str]:

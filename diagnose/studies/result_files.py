@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import json
 import platform
@@ -23,6 +22,7 @@ from diagnose.training.store import (
     model_description,
     save_model,
 )
+from gensig.text.csv_tables import write_records
 from gensig.version import __version__
 
 METRICS_SCHEMA_VERSION = 1
@@ -81,10 +81,7 @@ def write_rows(path: Path, rows: Iterable[Content]) -> None:
     """Write rows with the same keys, at least one, as a CSV file."""
     first, *others = rows
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(first), lineterminator="\n")
-        writer.writeheader()
-        writer.writerow(first)
-        writer.writerows(others)
+        write_records(file, list(first), [first, *others])
 
 
 def save_network(

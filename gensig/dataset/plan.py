@@ -15,6 +15,7 @@ from gensig.dataset.columns import COLUMNS, IS_REFERENCE
 from gensig.dataset.schema import kind_of
 from gensig.dataset.storage.atomic import read_text, require_digest
 from gensig.errors import DatasetError
+from gensig.text.csv_tables import read_rows, write_rows
 
 PLAN_BYTES_LIMIT = 4 * 1024**3
 
@@ -205,9 +206,8 @@ def plan_text(plan: Plan) -> str:
             )
         cells.append(texts)
     buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(plan.columns)
-    writer.writerows(zip(*cells, strict=True))
+    write_rows(buffer, [list(plan.columns)])
+    write_rows(buffer, zip(*cells, strict=True))
     return buffer.getvalue()
 
 
@@ -220,7 +220,7 @@ def read_plan(path: Path, *, sha256: str | None = None) -> Plan:
     if sha256 is not None:
         require_digest(path, text, sha256)
     try:
-        header, *rows = csv.reader(io.StringIO(text, newline=""), strict=True)
+        header, *rows = read_rows(io.StringIO(text, newline=""))
     except (csv.Error, ValueError) as error:
         raise DatasetError(
             f"{path} is no CSV table ({error}); restore it from a copy"
@@ -276,7 +276,7 @@ class PlanRows:
                 file.seek(begin)
                 text = file.read(end - begin).decode("utf-8")
             lines = text.removesuffix("\n").split("\n")
-            yield from csv.reader(lines, strict=True)
+            yield from read_rows(lines)
         except (OSError, ValueError, csv.Error) as error:
             raise DatasetError(
                 f"{self.path} is damaged ({error}); restore it from a copy"

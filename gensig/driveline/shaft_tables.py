@@ -15,6 +15,7 @@ from importlib import resources
 from pathlib import Path
 
 from gensig.errors import ConfigError
+from gensig.text.csv_tables import read_rows
 from gensig.text.user_file import check_file
 from gensig.units import UNITS, split_unit, to_si
 
@@ -210,7 +211,7 @@ def _read(
 
 def _cells(location: str, line: str) -> list[str]:
     try:
-        (row,) = csv.reader([line], strict=True)
+        (row,) = read_rows([line])
     except csv.Error:
         raise ConfigError(
             f"{location}: a double quote is open or out of place; give cells between "

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import IO
+from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gensig.text.csv_tables import write_rows
 
 Array = NDArray[np.float64]
 
@@ -41,16 +42,16 @@ class PaperFigure:
     panels: tuple[Panel, ...]
     reason: str = ""
 
-    def write_csv(self, file: IO[str]) -> None:
+    def write_csv(self, file: TextIO) -> None:
         """Write a line for every point: panel, curve, whether it is printed, x, y."""
-        writer = csv.writer(file)
-        writer.writerow(["panel", "curve", "is_printed", "x", "x_is", "y", "y_is"])
+        head = ["panel", "curve", "is_printed", "x", "x_is", "y", "y_is"]
+        write_rows(file, [head])
         for panel in self.panels:
             for curve in panel.curves:
                 for x, y in zip(curve.x, curve.y, strict=True):
                     point = f"{x:.10g}", panel.x_label, f"{y:.10g}", panel.y_label
                     printed = int(curve.is_printed)
-                    writer.writerow([panel.title, curve.label, printed, *point])
+                    write_rows(file, [[panel.title, curve.label, printed, *point]])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,10 +9,9 @@ written by hand and kept by later runs.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gensig.errors import ConfigError
+from gensig.text.csv_tables import read_records, write_rows
 
 FOLDER = Path(__file__).resolve().parent
 RANGES, RESULTS = FOLDER / "realism_ranges.csv", FOLDER / "realism_results.csv"
@@ -133,7 +133,7 @@ def compare(measured: Range, values: ArrayLike) -> Comparison:
 def read_ranges(path: Path = RANGES) -> dict[RangeKey, Range]:
     """The measured ranges, by id and conditions, in the order of the file."""
     with path.open(encoding="utf-8", newline="") as file:
-        rows = [Range(**_read(line, ("low", "high"))) for line in csv.DictReader(file)]
+        rows = [Range(**_read(line, ("low", "high"))) for line in read_records(file)]
     return {(row.id, row.at): row for row in rows}
 
 
@@ -145,12 +145,11 @@ def write_results(path: Path, heading: str, rows: Sequence[Comparison]) -> None:
     names = [field.name for field in fields(Comparison)]
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write(f"# {' '.join(heading.split())}\n")
-        writer = csv.DictWriter(file, names, lineterminator="\n")
-        writer.writeheader()
+        write_rows(file, [names])
         for row in rows:
-            values = asdict(row)
-            values["reason"] = row.reason or reasons.get(row.key, "")
-            writer.writerow({name: _written(value) for name, value in values.items()})
+            reason = row.reason or reasons.get(row.key, "")
+            values = asdict(replace(row, reason=reason))
+            write_rows(file, [list(map(_written, values.values()))])
 
 
 def read_results(path: Path = RESULTS) -> tuple[str, list[Comparison]]:
@@ -167,7 +166,7 @@ def read_results(path: Path = RESULTS) -> tuple[str, list[Comparison]]:
         )
     numbers = ("low", "high", "median", "p5", "p95")
     rows = []
-    for line in csv.DictReader(lines[1:]):
+    for line in read_records(lines[1:]):
         values = _read(line, numbers)
         rows.append(Comparison(**{**values, "n": int(line["n"])}))
     return lines[0][2:], rows

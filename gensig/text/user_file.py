@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
+from gensig.text.csv_tables import read_rows
 
 Array = NDArray[np.float64]
 
@@ -90,7 +91,7 @@ def _header(where: str, stream: TextIO) -> list[str]:
                 f"{where}: its columns are separated by {called}: "
                 "save it with commas, decimals with points"
             )
-    names = [name.strip() for name in next(csv.reader([line]), [])]
+    names = [name.strip() for name in next(read_rows([line]), [])]
     if any(map(_is_number, names)):
         raise ConfigError(
             f"{where}: its first line holds numbers, not names; "

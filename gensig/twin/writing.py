@@ -11,6 +11,7 @@ import numpy as np
 
 from gensig.errors import ConfigError
 from gensig.signals.transfer.path_gain import minimum_phase
+from gensig.text.csv_tables import header_line
 from gensig.text.option_writing import is_option_name, option_lines
 from gensig.twin.fitting import SOURCE_CHANNEL, Fit, oversampling
 
@@ -154,7 +155,7 @@ def _write_path(file: Path, fitted: Fit) -> None:
         np.column_stack([frequency, *columns]),
         "%.9g",
         ",",
-        header=",".join(names),
+        header=header_line(names),
         comments="",
     )
 
@@ -166,6 +167,6 @@ def _write_noise(file: Path, fitted: Fit) -> None:
         table,
         "%.9g",
         ",",
-        header=",".join(["frequency_hz", *fitted.sensors]),
+        header=header_line(["frequency_hz", *fitted.sensors]),
         comments="",
     )

@@ -31,6 +31,7 @@ from gensig.systems.base import Machine
 from gensig.systems.pair_machine import GearPairMachine, pair_dynamics
 from gensig.systems.run import Run
 from gensig.terminal.printing import show
+from gensig.text.csv_tables import header_line
 from gensig.units import SPEED, channel_unit, from_si
 
 ACCELERATION_REFERENCE = 1e-6  # m/s2, ISO 1683
@@ -269,7 +270,7 @@ def write_levels(run_up: RunUp, path: Path) -> None:
     header += [f"order_{order:g}_{unit}" for order in orders.axis]
     rpm = RPM * orders.speed
     table = np.column_stack([rpm, orders.time, orders.total, orders.rms])
-    np.savetxt(path, table, "%.6g", ",", header=",".join(header), comments="")
+    np.savetxt(path, table, "%.6g", ",", header=header_line(header), comments="")
 
 
 def print_run_up(run_up: RunUp) -> None:

@@ -37,6 +37,7 @@ from gensig.signals.indicators import crest_factor, kurtosis, rms
 from gensig.signals.run_up.speed_maps import LEAST_CHANGE
 from gensig.systems.base import Machine
 from gensig.terminal.printing import show
+from gensig.text.csv_tables import header_line
 from gensig.units import channel_unit
 
 RECORD_TYPES = (".h5", ".hdf5", ".csv")
@@ -215,7 +216,7 @@ def _write_csv(system: Machine, acceleration: np.ndarray, path: Path) -> None:
         header.append(f"{name}_{unit}")
     time = np.arange(acceleration.shape[1]) / system.sensing.sampling_rate
     table = np.column_stack([time, *acceleration])
-    np.savetxt(path, table, "%.9g", ",", header=",".join(header), comments="")
+    np.savetxt(path, table, "%.9g", ",", header=header_line(header), comments="")
 
 
 def _print_levels(system: Machine, acceleration: np.ndarray) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 import textwrap
@@ -17,6 +16,7 @@ from gensig.commands.new.stages import StagedSheet, shaft_diameters
 from gensig.commands.new.tip_relief import RELIEF_ORIGIN, tip_reliefs
 from gensig.geometry.contact import SIDES
 from gensig.systems.derived_sizes import BORE_SHARE, WIDTH_IN_MODULES
+from gensig.text.csv_tables import write_records
 
 Row: TypeAlias = dict[
     str, object
@@ -242,7 +242,5 @@ def _table(head: Sequence[str], columns: Sequence[str], rows: Sequence[Row]) -> 
     """A table as text: remarks, column names, rows."""
     remarks = [f"# {line}" for text in head for line in textwrap.wrap(text, HEAD_WIDTH)]
     stream = io.StringIO()
-    writer = csv.DictWriter(stream, columns, restval="", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
+    write_records(stream, columns, rows)
     return "\n".join(remarks) + "\n" + stream.getvalue()

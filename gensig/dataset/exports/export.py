@@ -3,7 +3,6 @@
 Few records are in memory at once.
 """
 
-import csv
 import re
 import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -44,6 +43,7 @@ from gensig.dataset.storage.atomic import (
 from gensig.dataset.storage.attributes import HDF5_ERRORS, set_attribute
 from gensig.dataset.storage.image import LIBRARY_VERSIONS
 from gensig.errors import DatasetError
+from gensig.text.csv_tables import write_rows
 
 TEXT_BYTES = 1024  # of a text column that the schema does not know
 HUGGING_FACE = "hf"
@@ -335,8 +335,7 @@ def _write_wav(
         if name not in further and data.shard_column(0, name).ndim == 1
     ]
     with (folder / "labels.csv").open("w", encoding="utf-8", newline="") as stream:
-        table = csv.writer(stream, lineterminator="\n")
-        table.writerow(["file", *["channel"] * one_channel, *names, *further])
+        write_rows(stream, [["file", *["channel"] * one_channel, *names, *further]])
         for shard, entry in enumerate(data.manifest.shards):
             first = data.first_record(shard)
             columns = [data.shard_column(shard, name).tolist() for name in names]
@@ -350,7 +349,7 @@ def _write_wav(
                 for suffix, channel, block in files:
                     file = f"{values[names.index('record_id')]}{suffix}.wav"
                     wavfile.write(folder / file, rate, np.ascontiguousarray(block.T))
-                    table.writerow([file, *channel, *values])
+                    write_rows(stream, [[file, *channel, *values]])
     text = attributes_json(data.attributes)
     (folder / "attributes.json").write_text(text, encoding="utf-8")
 

@@ -11,6 +11,7 @@ import numpy as np
 from gensig.dataset.folder.layout import TEXT_BYTES_LIMIT
 from gensig.dataset.storage.atomic import read_text, require_digest
 from gensig.errors import DatasetError
+from gensig.text.csv_tables import read_rows, write_rows
 
 SUBSETS = ("train", "validation", "test")
 HEADER = ("record_id", "start_fraction", "stop_fraction", "subset")
@@ -35,9 +36,7 @@ class SplitTable:
     def to_csv(self) -> str:
         """The table as CSV, floats in shortest round-trip form."""
         buffer = io.StringIO()
-        writer = csv.writer(buffer, lineterminator="\n")
-        writer.writerow(HEADER)
-        writer.writerows(self.rows())
+        write_rows(buffer, [HEADER, *self.rows()])
         return buffer.getvalue()
 
     def rows(self) -> Iterator[tuple[str, float, float, str]]:
@@ -55,7 +54,7 @@ def read_split(path: Path, *, sha256: str | None = None) -> SplitTable:
     if sha256 is not None:
         require_digest(path, text, sha256)
     try:
-        header, *rows = csv.reader(io.StringIO(text, newline=""), strict=True)
+        header, *rows = read_rows(io.StringIO(text, newline=""))
         if tuple(header) != HEADER:
             raise ValueError(
                 f"header is {','.join(header)[:80]}, expected {','.join(HEADER)}"

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import textwrap
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from gensig.text.csv_tables import write_rows
 from validation.pages import PAGES, Page
 from validation.realism_section import realism_lines
 from validation.rows import DIFFERS, FAILS, ROUGH, VERDICTS, Result
@@ -233,15 +233,15 @@ def _wrapped(paragraphs: Sequence[str]) -> str:
 def _rows(results: Sequence[Result]) -> str:
     """All rows as CSV."""
     file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    write_rows(file, [COLUMNS])
     for result in results:
         row, deviations = result.row, []
         if result.deviation is not None:
             deviations.append(result.deviation)
         deviation = _largest(deviations, rough=row.origin in ROUGH)
         place = row.origin, row.id, row.printed, _computed(result), row.unit
-        writer.writerow([*place, deviation, result.verdict, row.source, row.reason])
+        cells = [*place, deviation, result.verdict, row.source, row.reason]
+        write_rows(file, [cells])
     return file.getvalue()
 
 
