@@ -58,7 +58,8 @@ INSTALL = "pip install 'gensig[diagnose]'"
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
-    Exit status 0, 2 for a mistake, 3 for the flags of predict and detect, 130 when interrupted.
+    Exit status 0, 2 for a mistake, 3 for the flags of predict and detect, 130 when interrupted,
+    143 for SIGTERM.
     """
     from gensig.terminal.completion import answer, is_asked
 

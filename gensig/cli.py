@@ -30,7 +30,8 @@ OF_DIAGNOSE = (
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
-    Exit status 0, 1 for partial or damaged results, 2 for a mistake, 130 when interrupted.
+    Exit status 0, 1 for partial or damaged results, 2 for a mistake, 130 when interrupted, 143 for
+    SIGTERM.
     """
     from gensig.terminal.completion import answer, is_asked
 
@@ -73,9 +74,15 @@ def _run_verb(name: str, words: list[str]) -> int:
     from gensig.terminal.warning_lines import one_line_warnings
 
     module, function = verb.runs.split(":")
-    with one_line_warnings(PROGRAM), on_compilation(lambda: step(COMPILING)):
+    is_quiet = getattr(arguments, "quiet", False)
+
+    def on_compiling() -> None:
+        if not is_quiet:
+            step(COMPILING)
+
+    with one_line_warnings(PROGRAM, quiet=is_quiet), on_compilation(on_compiling):
         status = int(getattr(importlib.import_module(module), function)(arguments))
-    if verb.instead is not None:
+    if verb.instead is not None and not is_quiet:
         from gensig.commands.request import print_unread
 
         print_unread(arguments, verb.reads, verb.instead)

@@ -40,7 +40,7 @@ class StepError(SimulationError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """An interruption with the line that says how to go on."""
+    """An interruption; its text says what is kept and how to go on."""
 
 
 class DatasetError(GensigError):

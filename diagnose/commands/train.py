@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from diagnose.commands.parser import add_overrides, refuse_existing
-from gensig.errors import ConfigError
+from gensig.errors import ConfigError, Interrupted
 from gensig.options.configuration import Configuration
 from gensig.terminal.printing import show, tell
 from gensig.terminal.warning_lines import one_line_warnings
@@ -75,12 +75,15 @@ def _composed(overrides: Sequence[str], config_dir: str | None) -> Configuration
     """Configuration of one training; options of one's own may be in ./configs."""
     from gensig.options.compose import compose
     from gensig.options.own_options import with_own_options
+    from gensig.options.typed_only import refuse_untyped
 
     def read(folder: str | Path | None) -> Configuration:
         return compose("train", overrides, config_dir=folder)
 
     with one_line_warnings("diagnose"):
-        return with_own_options(read, config_dir)
+        config = with_own_options(read, config_dir)
+    refuse_untyped(config, overrides)
+    return config
 
 
 def _expand(overrides: Sequence[str], config_dir: str | None) -> list[Configuration]:
@@ -113,7 +116,12 @@ def _train_one(config: Configuration) -> None:
     settings = settings_from(config)
     out = Path(settings.out)
     refuse_existing(out)
-    page, lines = STUDIES[settings.task](settings, out)
+    try:
+        page, lines = STUDIES[settings.task](settings, out)
+    except KeyboardInterrupt:
+        if not out.exists():
+            raise
+        raise Interrupted(f"{out} is incomplete; remove it and train again") from None
     show(*lines)
     show(f"report: {page}")
 

@@ -35,6 +35,7 @@ from gensig.options.groups import (
 )
 from gensig.options.own_source import search_path
 from gensig.options.plain_file import check_choice
+from gensig.options.plain_values import check_values
 from gensig.options.references import check_tree, refuse_references
 from gensig.options.several_values import (
     MOST_ADVISED,
@@ -127,7 +128,9 @@ def _resolved(config: DictConfig) -> Configuration:
     values = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
     assert isinstance(values, dict)
     refuse_references(values, "a composed configuration")
-    return Configuration({str(key): value for key, value in values.items()})
+    plain = {str(key): value for key, value in values.items()}
+    check_values(plain)
+    return Configuration(plain)
 
 
 def check_references(config: DictConfig) -> None:

@@ -40,6 +40,18 @@ FIXED_KEYS = (
 
 
 @final
+class MissingKeyError(ConfigError, KeyError):
+    """A key that a group lacks, as where an option file is empty; a KeyError as of any mapping."""
+
+    def __init__(self, where: str, key: str) -> None:
+        super().__init__(
+            f"{where} has no key '{key}'; complete its option file, or choose another option"
+        )
+
+    __str__ = Exception.__str__
+
+
+@final
 class Section(Mapping[str, Any]):
     """One group of keys of a configuration, read-only.
 
@@ -57,6 +69,8 @@ class Section(Mapping[str, Any]):
         )
 
     def __getitem__(self, key: str) -> Any:
+        if key not in self._values:
+            raise MissingKeyError(self.name, key)
         return self._values[key]
 
     def __iter__(self) -> Iterator[str]:
@@ -115,6 +129,8 @@ class Configuration(Mapping[str, Any]):
         }
 
     def __getitem__(self, key: str) -> Any:
+        if key not in self._values:
+            raise MissingKeyError("the configuration", key)
         value = self._values[key]
         return Section(key, value) if isinstance(value, Mapping) else value
 

@@ -19,6 +19,7 @@ from gensig.options.compose import (
     nearest_key,
 )
 from gensig.options.groups import group_names, parse
+from gensig.options.plain_values import check_values
 from gensig.options.references import refuse_references
 
 
@@ -79,6 +80,7 @@ def changed_content(
         ) from None
     assert isinstance(result, dict)
     refuse_references(result, "a stored configuration")
+    check_values({str(key): value for key, value in result.items()})
     return {
         str(key): value
         for key, value in result.items()

@@ -21,6 +21,7 @@ from gensig.life.life_options import RUN_TO_FAILURE
 from gensig.options.configuration import Configuration
 from gensig.options.groups import options
 from gensig.options.own_options import with_own_options
+from gensig.options.plain_values import require_keys
 from gensig.plan.condition_courses import settle_courses
 from gensig.plan.sources import OptionFiles, Source, StoredConfiguration, read_stored
 from gensig.plan.words import Words, typed_words
@@ -189,6 +190,7 @@ def _class_fault(
     ``name`` None for that of the whole configuration.
     """
     words = source.words
+    require_keys(option, f"fault={name or 'option'}", "kind")
     typed = {
         key: word
         for key, word in words.fault_words.items()
@@ -289,6 +291,14 @@ def _check_shape(composed: Mapping[str, Any]) -> None:
             raise ConfigError(
                 f"{key} = {composed.get(key)!r} must be a group of keys; choose an option "
                 "or leave it alone"
+            )
+    require_keys(composed["fault"], "fault", "kind")
+    require_keys(composed["plan"], "plan", "classes", "n_records", "vary")
+    for side in SIDES:
+        if not isinstance(composed["gear"].get(side), dict):
+            raise ConfigError(
+                f"gear.{side} = {composed['gear'].get(side)!r} must be a group of keys; complete "
+                "the option of gear, or choose another"
             )
     for key in composed:
         if key not in SECTIONS + OPTIONAL_SECTIONS + PLAIN_KEYS:

@@ -13,6 +13,7 @@ from gensig.errors import ConfigError, SimulationError
 from gensig.execution.base import Executor, read_n_workers
 from gensig.execution.local import LocalExecutor
 from gensig.execution.registry import read_executor
+from gensig.options.typed_only import refuse_untyped
 from gensig.plan.doubts import plan_doubts
 from gensig.plan.request import Request, read_request
 from gensig.production.folder import begin_folder, run_folder
@@ -54,6 +55,7 @@ def make_folder(
 
 
 def _executor(request: Request, workers: int | None) -> Executor:
+    refuse_untyped(request.config.with_entries(out=None), request.overrides)
     if workers is not None:
         return LocalExecutor(n_workers=read_n_workers(workers))
     executor = read_executor(request.config["executor"])

@@ -9,14 +9,16 @@ from collections.abc import Callable, Mapping
 from typing import Any, NoReturn
 
 from gensig.errors import ConfigError, GensigError
+from gensig.terminal.interruptions import INTERRUPTED, TERMINATED, terminable
 from gensig.terminal.printing import remark, show_text
 from gensig.text import nearest
 
-MISTAKE, INTERRUPTED = 2, 130
+MISTAKE = 2
 EXITS = {
     0: "as asked",
     MISTAKE: "a mistake or a file that cannot be used: one line says what",
     INTERRUPTED: "interrupted",
+    TERMINATED: "stopped by SIGTERM",
 }
 HELP_FLAGS = ("-h", "--help")
 # how argparse begins what it says of words that it does not know, and of words that it misses
@@ -178,6 +180,15 @@ def guarded(program: str, run: Callable[[], int]) -> int:
 
     A mistake, a file that cannot be used and an interruption become one line on stderr.
     """
+    with terminable() as stop:
+        try:
+            return _status_of(program, run)
+        except KeyboardInterrupt as interruption:
+            remark(program, stop.line(str(interruption)))
+            return stop.status
+
+
+def _status_of(program: str, run: Callable[[], int]) -> int:
     try:
         status = run()
         sys.stdout.flush()
@@ -193,9 +204,6 @@ def guarded(program: str, run: Callable[[], int]) -> int:
         if error.filename:
             message = f"{error.filename}: {message}"
         return complain(program, message)
-    except KeyboardInterrupt as interruption:
-        complain(program, str(interruption) or "interrupted")
-        return INTERRUPTED
 
 
 def complain(program: str, message: str) -> int:

@@ -12,10 +12,10 @@ from gensig.text.escaping import one_line
 
 
 @contextmanager
-def one_line_warnings(program: str) -> Iterator[None]:
+def one_line_warnings(program: str, *, quiet: bool = False) -> Iterator[None]:
     """Print each different warning once, as one line.
 
-    Of a category with the attribute ``once`` the first is printed only.
+    Of a category with the attribute ``once`` the first is printed only; ``quiet`` prints none.
     """
     seen: set[object] = set()
 
@@ -26,7 +26,7 @@ def one_line_warnings(program: str) -> Iterator[None]:
         key: object = text
         if getattr(category, "once", False):
             key = category
-        if key not in seen:
+        if key not in seen and not quiet:
             seen.add(key)
             remark(program, f"note: {text}")
 

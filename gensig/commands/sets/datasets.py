@@ -164,7 +164,9 @@ def resume(arguments: Namespace) -> int:
     if manifest.is_complete and not absences(out, manifest):
         if asked is not None:
             joined_folder(out, asked=asked.plain())
-        return _print_complete(out, manifest.n_failed, manifest.n_records)
+        return _print_complete(
+            out, manifest.n_failed, manifest.n_records, quiet=arguments.quiet
+        )
     return run(
         out,
         executor,
@@ -192,10 +194,13 @@ def finalize(arguments: Namespace) -> int:
     return _print_complete(out, manifest.n_failed, manifest.n_records)
 
 
-def _print_complete(out: Path, n_failed: int, n_records: int) -> int:
+def _print_complete(
+    out: Path, n_failed: int, n_records: int, *, quiet: bool = False
+) -> int:
     """Print that a folder is complete, and return its exit status."""
     print_failed(out, n_failed, n_records)
-    show(f"{out} is complete: {n_records} records")
+    if not quiet:
+        show(f"{out} is complete: {n_records} records")
     return int(n_failed > 0)
 
 

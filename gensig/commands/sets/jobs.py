@@ -9,6 +9,7 @@ from pathlib import Path
 
 from gensig.errors import ConfigError
 from gensig.options.compose import job_folders, sweep
+from gensig.options.typed_only import refuse_untyped
 from gensig.plan.request import Request, read_request
 
 
@@ -61,6 +62,8 @@ def read_jobs(arguments: Namespace) -> list[Job]:
         )
         for combination in combinations
     ]
+    for request, combination in zip(requests, combinations, strict=True):
+        refuse_untyped(request.config, combination)
     parents = {str(request.config["out"] or "") for request in requests}
     if len(parents) > 1:
         raise ConfigError(

@@ -67,7 +67,7 @@ def run(
                     maker=maker or maker_of(out),
                 )
         except KeyboardInterrupt:
-            raise Interrupted(f"interrupted; {out} is incomplete, {going_on}") from None
+            raise Interrupted(f"{out} is incomplete, {going_on}") from None
     for problem in problems:
         remark(problem)
     if problems:

@@ -1,0 +1,247 @@
+"""Hostile option files against ``gensig plan``: ``python -m benchmarks.hostile_options``.
+
+Each case is an option file of a stranger: one of the package's options in which one key has a
+value of a wrong shape, or a file that is no option at all. It is read, planned, and the inputs of
+its first record are made, as ``gensig plan`` does before it simulates. A case is answered by one
+line, accepted because the value can be used, or ends otherwise: a traceback, an answer that takes
+too long.
+
+``--count`` is the number of cases, ``--seed`` draws them, ``--first`` skips some, ``--json FILE``
+writes the figures and ``--table`` prints a line for each case. The exit status is 1 where any case
+ended otherwise.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import json
+import random
+import signal
+import sys
+import tempfile
+import traceback
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from gensig.errors import GensigError
+from gensig.options.files import groups, options, section_keys, sections
+from gensig.text.escaping import escaped, one_line
+
+SECONDS = 60  # for one case
+MOST_RECORDS = 10_000  # whose plan is made; larger plans are only counted
+GROUPS = tuple(group.name for group in groups() if group.primary == "generate")
+# texts of YAML by what is wrong with them
+VALUES = {
+    "null": "null",
+    "list": "[1, 2]",
+    "list of lists": "[[1], {a: [2]}]",
+    "empty list": "[]",
+    "mapping": "{a: 1, b: [2]}",
+    "empty mapping": "{}",
+    "text": "abc",
+    "empty text": "''",
+    "escape sequence": '"\\e[31mred\\e[0m"',
+    "formula": "'=cmd'",
+    "true": "true",
+    "negative": "-1",
+    "zero": "0",
+    "nan": ".nan",
+    "infinity": ".inf",
+    "beyond floats": "1e400",
+    "huge number": "1" + "0" * 30,
+    "date": "2020-01-01",
+}
+# whole files that are no options
+FILES = {
+    "empty": "",
+    "a remark": "# nothing\n",
+    "null": "null\n",
+    "a list": "- 1\n- 2\n",
+    "a text": "abc\n",
+    "kind alone": "kind: 3\n",
+    "unknown keys": "a: 1\nb: {c: [2]}\n",
+    "no YAML": "a: [1\n",
+    "two documents": "a: 1\n---\nb: 2\n",
+    "vary is a list": "kind: crack\nvary: [1, 2]\n",
+    "vary is a text": "kind: crack\nvary: abc\n",
+    "numbers as keys": "1: 2\n2.5: 3\n",
+    "sets out": "# @package _global_\nout: ../elsewhere\n",
+    "sets an address": "# @package _global_\nexecutor: {kind: dask, address: 'tcp://h:1'}\n",
+    "sets the seed": "# @package _global_\nseed: [1]\n",
+    "sections are texts": "# @package _global_\nplan: abc\nfault: 3\n",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """One hostile file: its group, the option it changes, the key, and the value.
+
+    ``key`` is empty for a whole file; ``text`` is the content of the file.
+    """
+
+    group: str
+    option: str
+    key: str
+    kind: str
+    text: str
+
+
+def cases() -> list[Case]:
+    """Every case, in a fixed order."""
+    result = []
+    for group in GROUPS:
+        for kind, text in FILES.items():
+            result.append(Case(group=group, option="", key="", kind=kind, text=text))
+        for option in options(group):
+            if group != "experiment":
+                content = option.file.read_text(encoding="utf-8")
+                result += _changed(group, option.name, yaml.safe_load(content) or {})
+    for section in sections():
+        keys = section_keys(section)
+        for key in keys:
+            result += _typed(section, key.name)
+    return result
+
+
+def _changed(group: str, option: str, content: dict[str, Any]) -> Iterator[Case]:
+    """Cases of an option: each of its keys, nested ones too, with each value."""
+    head = f"defaults: [{option}, _self_]\n"
+    for path in _paths({key: content[key] for key in content if key != "defaults"}):
+        for kind, value in VALUES.items():
+            text = value
+            for name in reversed(path):
+                text = f"{{{json.dumps(name)}: {text}}}"
+            body = f"{json.dumps(path[0])}: {text[text.index(':') + 1 : -1].strip()}\n"
+            yield Case(
+                group=group,
+                option=option,
+                key=".".join(map(str, path)),
+                kind=kind,
+                text=head + body,
+            )
+
+
+def _typed(section: str, key: str) -> Iterator[Case]:
+    """Cases of a key that has no group, set by an experiment."""
+    for kind, value in VALUES.items():
+        text = value
+        for name in reversed(key.split(".")):
+            text = f"{{{name}: {text}}}"
+        yield Case(
+            group="experiment",
+            option="",
+            key=key,
+            kind=kind,
+            text=f"# @package _global_\n{text[1:-1]}\n",
+        )
+
+
+def _paths(content: dict[str, Any]) -> Iterator[tuple[str, ...]]:
+    for key, value in content.items():
+        yield (key,)
+        if isinstance(value, dict):
+            yield from ((key, *inner) for inner in _paths(value))
+
+
+def answer(case: Case, folder: Path) -> tuple[str, str]:
+    """How a case ends: ``one line``, ``accepted`` or ``otherwise``, and its text."""
+    target = folder / case.group / "stranger.yaml"
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(case.text, encoding="utf-8")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            _dry_run([*NEEDS.get(case.group, ()), f"{case.group}=stranger"], folder)
+    except GensigError as error:
+        return "one line", one_line(str(error))
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt):
+            raise
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(last.filename).name}:{last.lineno}"
+        return "otherwise", f"{type(error).__name__} in {where}: {error}"
+    finally:
+        target.unlink()
+    return "accepted", ""
+
+
+# what makes the group of a case read
+NEEDS = {"excitation": ("system=shaft_line",), "heat": ("system=helical_pair",)}
+
+
+def _dry_run(words: list[str], folder: Path) -> None:
+    """Everything that ``gensig plan`` does before it simulates."""
+    from gensig.execution.registry import read_executor
+    from gensig.plan.make import make_plan, read_counts
+    from gensig.plan.request import read_request
+    from gensig.record.inputs import InputReader
+    from gensig.record.options import read_dataset_options
+
+    config = read_request(words, config_dir=folder).config
+    read_executor(config["executor"])
+    read_dataset_options(config)
+    if (
+        config["life"].get("kind") is None
+        and read_counts(config).n_records > MOST_RECORDS
+    ):
+        return
+    plan = make_plan(config)
+    InputReader(config).inputs(plan.record(0))
+
+
+def run(chosen: list[Case]) -> Iterator[tuple[Case, str, str]]:
+    """Cases with their answers; a case that takes too long ends ``otherwise``."""
+
+    def late(_signal: int, _frame: object) -> None:
+        raise TimeoutError(f"no answer in {SECONDS} s")
+
+    before = signal.signal(signal.SIGALRM, late)
+    try:
+        with tempfile.TemporaryDirectory() as scratch:
+            for case in chosen:
+                signal.alarm(SECONDS)
+                ending, text = answer(case, Path(scratch))
+                signal.alarm(0)
+                yield case, ending, text
+    finally:
+        signal.signal(signal.SIGALRM, before)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--count", type=int, default=80)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--table", action="store_true")
+    arguments = parser.parse_args()
+    everything = cases()
+    random.Random(arguments.seed).shuffle(everything)
+    chosen = everything[arguments.first : arguments.first + arguments.count]
+    counts, bad = collections.Counter[str](), []
+    for case, ending, text in run(chosen):
+        counts[ending] += 1
+        where = f"{case.group}={case.option} {case.key}: {case.kind}"
+        if ending == "otherwise":
+            bad.append(f"{where}: {escaped(text)}")
+        if ending == "otherwise" or arguments.table:
+            print(f"{ending}: {where}: {escaped(text)}", flush=True)
+    figures = {"cases": len(chosen), "of": len(everything), **counts, "bad": bad}
+    print(json.dumps({**figures, "bad": len(bad)}))
+    if arguments.json is not None:
+        arguments.json.write_text(
+            json.dumps(figures, indent=1) + "\n", encoding="utf-8"
+        )
+    return int(bool(bad))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

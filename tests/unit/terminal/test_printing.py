@@ -1,0 +1,88 @@
+"""The door to the terminal: whatever is printed, no foreign character controls it."""
+
+import io
+import json
+import sys
+import warnings
+
+import pytest
+
+from diagnose.progress import progress
+from gensig.commands.console import remark, step
+from gensig.dataset.folder.layout import LOG
+from gensig.dataset.folder.run_log import log
+from gensig.errors import ConfigError
+from gensig.terminal.printing import show, show_text, tell, tell_text
+from gensig.terminal.program import guarded
+from gensig.terminal.warning_lines import one_line_warnings
+
+HOSTILE = "crack\x1b[2K\r\x9b1m\u202e\u2028\nforged: all is whole"
+SHOWN = "crack\\x1b[2K\\r\\x9b1m\\u202e\\u2028\\nforged: all is whole"
+ON_ONE_LINE = SHOWN.replace("\\n", " ")
+
+
+def test_lines_are_escaped_and_those_of_the_program_stay(capsys):
+    show("one", HOSTILE)
+    tell("two", HOSTILE)
+    show_text("a\n  b\n")
+    tell_text("c\n")
+    printed = capsys.readouterr()
+    assert printed.out == f"one\n{SHOWN}\na\n  b\n"
+    assert printed.err == f"two\n{SHOWN}\nc\n"
+
+
+def test_json_keeps_its_values(capsys):
+    show_text(json.dumps({"name": HOSTILE}, indent=1))
+    printed = capsys.readouterr().out
+    assert printed.isascii()
+    assert json.loads(printed) == {"name": HOSTILE}
+
+
+def test_a_terminal_that_lacks_a_letter_shows_its_number(monkeypatch):
+    file = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stdout", file)
+    show("\u00b5m")
+    assert file.buffer.getvalue() == b"\\xb5m\n"
+
+
+def fail(_text=HOSTILE):
+    raise ConfigError(_text)
+
+
+def lose(_text=HOSTILE):
+    raise FileNotFoundError(2, "No such file", _text)
+
+
+def warn():
+    with one_line_warnings("gensig"):
+        warnings.warn(HOSTILE, stacklevel=1)
+
+
+def work():
+    with progress(1) as advance:
+        advance(HOSTILE)
+
+
+@pytest.mark.parametrize(
+    "act",
+    [
+        lambda: guarded("gensig", fail),
+        lambda: guarded("diagnose", lose),
+        warn,
+        work,
+        lambda: remark(HOSTILE),
+        lambda: step(HOSTILE),
+    ],
+)
+def test_what_goes_to_stderr_is_one_line(act, capsys):
+    act()
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1
+    assert printed.removesuffix("\n").isprintable()
+    assert SHOWN in printed or ON_ONE_LINE in printed
+
+
+def test_the_log_of_a_run_is_escaped(tmp_path):
+    log(tmp_path, HOSTILE)
+    (line,) = (tmp_path / LOG).read_text().split("\n")[:-1]
+    assert line.endswith(ON_ONE_LINE)
