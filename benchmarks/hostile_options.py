@@ -33,7 +33,7 @@ from gensig.errors import GensigError
 from gensig.options.files import groups, options, section_keys, sections
 from gensig.text.escaping import escaped, one_line
 
-SECONDS = 60  # for one case
+SECONDS = 60  # of computing, for one case
 MOST_RECORDS = 10_000  # whose plan is made; larger plans are only counted
 GROUPS = tuple(group.name for group in groups() if group.primary == "generate")
 # texts of YAML by what is wrong with them
@@ -100,8 +100,8 @@ def cases() -> list[Case]:
             result.append(Case(group=group, option="", key="", kind=kind, text=text))
         for option in options(group):
             if group != "experiment":
-                content = option.file.read_text(encoding="utf-8")
-                result += _changed(group, option.name, yaml.safe_load(content) or {})
+                text = option.file.read_text(encoding="utf-8")
+                result += _changed(group, option.name, text)
     for section in sections():
         keys = section_keys(section)
         for key in keys:
@@ -109,9 +109,12 @@ def cases() -> list[Case]:
     return result
 
 
-def _changed(group: str, option: str, content: dict[str, Any]) -> Iterator[Case]:
+def _changed(group: str, option: str, text: str) -> Iterator[Case]:
     """Cases of an option: each of its keys, nested ones too, with each value."""
+    content = yaml.safe_load(text) or {}
     head = f"defaults: [{option}, _self_]\n"
+    if "@package _global_" in text:
+        head = f"# @package _global_\n{head}"
     for path in _paths({key: content[key] for key in content if key != "defaults"}):
         for kind, value in VALUES.items():
             text = value
@@ -172,7 +175,7 @@ def answer(case: Case, folder: Path) -> tuple[str, str]:
 
 
 # what makes the group of a case read
-NEEDS = {"excitation": ("system=shaft_line",), "heat": ("system=helical_pair",)}
+NEEDS = {"excitation": ("system=two_stage_gearbox",), "heat": ("system=helical_pair",)}
 
 
 def _dry_run(words: list[str], folder: Path) -> None:
@@ -199,18 +202,18 @@ def run(chosen: list[Case]) -> Iterator[tuple[Case, str, str]]:
     """Cases with their answers; a case that takes too long ends ``otherwise``."""
 
     def late(_signal: int, _frame: object) -> None:
-        raise TimeoutError(f"no answer in {SECONDS} s")
+        raise TimeoutError(f"no answer in {SECONDS} s of computing")
 
-    before = signal.signal(signal.SIGALRM, late)
+    before = signal.signal(signal.SIGPROF, late)
     try:
         with tempfile.TemporaryDirectory() as scratch:
             for case in chosen:
-                signal.alarm(SECONDS)
+                signal.setitimer(signal.ITIMER_PROF, SECONDS)
                 ending, text = answer(case, Path(scratch))
-                signal.alarm(0)
+                signal.setitimer(signal.ITIMER_PROF, 0)
                 yield case, ending, text
     finally:
-        signal.signal(signal.SIGALRM, before)
+        signal.signal(signal.SIGPROF, before)
 
 
 def main() -> int:

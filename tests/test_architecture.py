@@ -78,7 +78,8 @@ GENSIG = {
     "mesh": "compilation errors geometry material options units",
     "operation": "errors options text units",
     "options": "errors text units",
-    "papers": "driveline dynamics faults life operation options sensing signals systems units",
+    "papers": "driveline dynamics faults life operation options sensing signals systems text "
+    "units",
     "plan": (
         "dataset dynamics errors faults geometry life mesh operation options record "
         "systems units"
@@ -314,3 +315,66 @@ def test_a_moved_module_is_the_same_object() -> None:
         "assert diagnose.metrics is new"
     )
     assert run(sys.executable, "-c", code).returncode == 0
+
+
+# the doors: what reaches a terminal is escaped, and no cell of a table is a formula
+DOORS = {
+    "gensig/terminal/printing.py": {"print"},
+    "gensig/commands/new/gearbox.py": {"input"},  # questions of its own
+    "gensig/text/csv_tables.py": {"csv.reader", "csv.writer"},
+}
+PRINTING = {"print", "input", "pprint.pprint", "rich.print", "sys.excepthook"}
+STREAMS = {"sys.stdout", "sys.stderr", "sys.__stdout__", "sys.__stderr__"}
+TABLES = {"csv.reader", "csv.writer", "csv.DictReader", "csv.DictWriter"}
+ON_STREAMS = {"isatty", "flush"}
+
+
+def past_the_doors(text: str) -> set[str]:
+    """Names by which a module prints, or reads or writes CSV, by itself."""
+    result = set()
+    parents = {
+        child: node
+        for node in ast.walk(ast.parse(text))
+        for child in ast.iter_child_nodes(node)
+    }
+    for node, parent in parents.items():
+        name = ast.unparse(node) if isinstance(node, ast.Name | ast.Attribute) else ""
+        called = isinstance(parent, ast.Call) and parent.func is node
+        if called and name in PRINTING | TABLES:
+            result.add(name)
+        handled = isinstance(parent, ast.Attribute) and parent.attr in ON_STREAMS
+        if name in STREAMS and not handled:
+            result.add(name)
+        if called and name.endswith("to_csv") and not ast.unparse(parent).endswith("()"):
+            result.add(name)
+    return result
+
+
+def test_nothing_is_printed_and_no_table_written_past_the_doors() -> None:
+    result = {}
+    for path in python_files():
+        name = path.relative_to(ROOT).as_posix()
+        names = past_the_doors(path.read_text())
+        if name == "gensig/terminal/printing.py":
+            names -= STREAMS
+        if names:
+            result[name] = names
+    assert result == DOORS
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "print('a')",
+        "print('a', file=sys.stderr)",
+        "sys.stdout.write('a')",
+        "write = sys.stderr.write",
+        "out = sys.stdout",
+        "rows = csv.writer(file)",
+        "csv.DictReader(file)",
+        "frame.to_csv(path)",
+    ],
+)
+def test_what_passes_a_door_is_seen(line: str) -> None:
+    assert past_the_doors(line)
+    assert not past_the_doors("sys.stdout.flush(); sys.stderr.isatty(); show('a')")

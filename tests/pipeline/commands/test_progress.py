@@ -22,6 +22,7 @@ from gensig.production.folder import run_folder
 from gensig.production.record_counts import RecordCounts, record_counts
 from gensig.production.shard_writing import write_shard
 from gensig.terminal import run_progress
+from gensig.terminal.interruptions import AGAIN
 from gensig.terminal.run_progress import COMPILING, Progress, RunProgress
 
 STATE = Progress(
@@ -252,4 +253,4 @@ def test_an_interruption_without_a_data_set_names_none(monkeypatch, capsys):
 
     monkeypatch.setattr("gensig.commands.options.groups", interrupt)
     assert main(["options"]) == 130
-    assert capsys.readouterr().err == "gensig: interrupted\n"
+    assert capsys.readouterr().err == f"gensig: interrupted; {AGAIN}\n"

@@ -60,7 +60,9 @@ def test_a_handler_of_the_calling_program_stays():
 
 def test_in_a_thread_nothing_is_set():
     result = []
-    thread = threading.Thread(target=lambda: result.append(guarded("gensig", lambda: 3)))
+    thread = threading.Thread(
+        target=lambda: result.append(guarded("gensig", lambda: 3))
+    )
     thread.start()
     thread.join()
     assert result == [3]

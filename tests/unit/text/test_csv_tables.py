@@ -31,7 +31,19 @@ FORMULAS = [
     "=",
     "-crack",
 ]
-HARMLESS = ["", "crack", "-1.5", "+3e-4", "-inf", "nan", "-12.3 %", "a=b", "'quoted'", "'", "1-2"]
+HARMLESS = [
+    "",
+    "crack",
+    "-1.5",
+    "+3e-4",
+    "-inf",
+    "nan",
+    "-12.3 %",
+    "a=b",
+    "'quoted'",
+    "'",
+    "1-2",
+]
 MARKED = [f"{marks}{text}" for marks in ("'", "''") for text in (*FORMULAS, *HARMLESS)]
 
 
@@ -69,7 +81,7 @@ def test_rows_and_records_come_back():
 
 
 def test_a_header_of_numbers_is_quoted_too():
-    assert header_line(["time_s", "=x", "a,b"]) == "time_s,'=x,\"a,b\""
+    assert header_line(["time_s", "=x", "a,b"]) == 'time_s,\'=x,"a,b"'
 
 
 @pytest.mark.parametrize("unit", ["=unit", "-", "'=unit", "plain"])

@@ -32,7 +32,8 @@ def test_hidden_characters_are_shown(text):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "crack, 3.2 mm", "m/s\u00b2 \u00b5m", "Z\u00e4hne", "\u9f7f\u8f6e", "C:\\new"]
+    "text",
+    ["", "crack, 3.2 mm", "m/s\u00b2 \u00b5m", "Z\u00e4hne", "\u9f7f\u8f6e", "C:\\new"],
 )
 def test_ordinary_text_is_shown_as_it_is(text):
     assert escaped(text) == text
