@@ -14,6 +14,7 @@ from typing import Any
 from gensig.errors import ConfigError
 from gensig.terminal.printing import show, show_text, tell_text
 from gensig.terminal.program import HELP_FLAGS, Parser, exit_text, guarded, refuse_verb
+from gensig.text.escaping import set_warning_lines
 from gensig.version import __version__
 
 # Verb -> its purpose. ``diagnose.commands.VERB`` has HELP, EXAMPLE, ``add_arguments(parser)`` and
@@ -95,6 +96,7 @@ def _dispatch(words: list[str]) -> int:
     try:
         arguments = verb_parser(verb).parse_intermixed_args(rest)
         _require_packages()
+        set_warning_lines(PROGRAM)
         return int(_module(verb).run(arguments))
     except SystemExit as leaving:  # --help
         return int(leaving.code or 0)

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from gensig.errors import GensigError
+from gensig.text.escaping import set_warning_lines
 
 # glibc, malloc.h: above which size a block has pages of its own, and how much freed memory
 # at the end of the heap goes back to the system
@@ -108,6 +109,7 @@ def keep_freed_memory() -> bool:
 
 
 def _start(function: Callable[..., Any], shared: Sequence[Any]) -> None:
+    set_warning_lines("diagnose")
     keep_freed_memory()
     limit = one_thread()
     limit.__enter__()

@@ -68,7 +68,7 @@ GENSIG = {
         "systems text units"
     ),
     "dynamics": "compilation errors geometry material mesh operation units",
-    "execution": "errors options",
+    "execution": "errors options text",
     "faults": "errors geometry units",
     "geometry": "errors units",
     "implants": "dataset errors execution production signals version",
@@ -345,7 +345,11 @@ def past_the_doors(text: str) -> set[str]:
         handled = isinstance(parent, ast.Attribute) and parent.attr in ON_STREAMS
         if name in STREAMS and not handled:
             result.add(name)
-        if called and name.endswith("to_csv") and not ast.unparse(parent).endswith("()"):
+        if (
+            called
+            and name.endswith("to_csv")
+            and not ast.unparse(parent).endswith("()")
+        ):
             result.add(name)
     return result
 

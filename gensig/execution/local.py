@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import threading
+import warnings
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -24,6 +25,7 @@ from gensig.execution.base import (
     T,
     guarded,
 )
+from gensig.text.escaping import set_warning_lines
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +90,9 @@ def _worker() -> ProcessPoolExecutor:
     for name in THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
     context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(1, mp_context=context, initializer=_begin_worker)
+    return ProcessPoolExecutor(
+        1, mp_context=context, initializer=_begin_worker, initargs=(_is_quiet(),)
+    )
 
 
 def _submit(
@@ -137,8 +141,17 @@ def _main_unknown() -> Iterator[None]:
         main.__dict__.update(hidden)
 
 
-def _begin_worker() -> None:
-    """Leave Ctrl-C to the parent, and end when the parent ends."""
+def _is_quiet() -> bool:
+    """True where this process shows no warnings, as with ``--quiet``."""
+    first = warnings.filters[0] if warnings.filters else ("default", None, None)
+    return first[0] == "ignore" and first[2] is UserWarning
+
+
+def _begin_worker(is_quiet: bool) -> None:
+    """Leave Ctrl-C to the parent, show warnings as it does, and end when the parent ends."""
+    set_warning_lines("gensig")
+    if is_quiet:
+        warnings.simplefilter("ignore", UserWarning)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:

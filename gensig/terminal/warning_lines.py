@@ -26,11 +26,11 @@ def one_line_warnings(program: str, *, quiet: bool = False) -> Iterator[None]:
         key: object = text
         if getattr(category, "once", False):
             key = category
-        if key not in seen and not quiet:
+        if key not in seen:
             seen.add(key)
             remark(program, f"note: {text}")
 
     with warnings.catch_warnings():
-        warnings.simplefilter("always", UserWarning)
+        warnings.simplefilter("ignore" if quiet else "always", UserWarning)
         warnings.showwarning = show
         yield

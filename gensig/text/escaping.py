@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
+import warnings
+from typing import Any
 
 # Unicode categories: control, format, surrogate, line and paragraph separators
 HIDDEN = frozenset(("Cc", "Cf", "Cs", "Zl", "Zp"))
@@ -37,6 +39,15 @@ def one_line(text: str) -> str:
     Messages of libraries have several lines; breaks of other kinds are foreign and escaped.
     """
     return " ".join(escaped(part) for part in re.split("[ \n]+", text.strip(" \n")))
+
+
+def set_warning_lines(program: str) -> None:
+    """Let Python print a warning of this process as one line, `escaped`, as in a worker process."""
+
+    def line(message: Warning | str, *_details: Any, **_more: Any) -> str:
+        return f"{program}: note: {one_line(str(message))}\n"
+
+    warnings.formatwarning = line
 
 
 def _shown(character: str) -> str:
