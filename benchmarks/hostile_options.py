@@ -17,12 +17,13 @@ import argparse
 import collections
 import json
 import random
+import re
 import signal
 import sys
 import tempfile
 import traceback
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -109,6 +110,17 @@ def cases() -> list[Case]:
     return result
 
 
+def drawn(everything: list[Case], seed: int) -> list[Case]:
+    """The cases in random order, whole files and single keys by turns while both last."""
+    random.Random(seed).shuffle(everything)
+    files = [case for case in everything if not case.key]
+    keys = [case for case in everything if case.key]
+    n_both = min(len(files), len(keys))
+    pairs = zip(files[:n_both], keys[:n_both], strict=True)
+    by_turns = [case for pair in pairs for case in pair]
+    return [*by_turns, *files[n_both:], *keys[n_both:]]
+
+
 def _changed(group: str, option: str, text: str) -> Iterator[Case]:
     """Cases of an option: each of its keys, nested ones too, with each value."""
     content = yaml.safe_load(text) or {}
@@ -160,7 +172,7 @@ def answer(case: Case, folder: Path) -> tuple[str, str]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            _dry_run([*NEEDS.get(case.group, ()), f"{case.group}=stranger"], folder)
+            _dry_run([*needed(case), f"{case.group}=stranger"], folder)
     except GensigError as error:
         return "one line", one_line(str(error))
     except BaseException as error:
@@ -175,6 +187,18 @@ def answer(case: Case, folder: Path) -> tuple[str, str]:
 
 
 # what makes the group of a case read
+def needed(case: Case) -> Sequence[str]:
+    """Words without which the group of a case is not read."""
+    if case.option in HELICAL_GEARS:
+        return ("system=helical_pair",)
+    return NEEDS.get(case.group, ())
+
+
+HELICAL_GEARS = {
+    option.name
+    for option in options("gear")
+    if re.search(r"^helix_angle_deg: *[1-9]", option.file.read_text("utf-8"), re.M)
+}
 NEEDS = {"excitation": ("system=two_stage_gearbox",), "heat": ("system=helical_pair",)}
 
 
@@ -226,8 +250,7 @@ def main() -> int:
     parser.add_argument("--json", type=Path)
     parser.add_argument("--table", action="store_true")
     arguments = parser.parse_args()
-    everything = cases()
-    random.Random(arguments.seed).shuffle(everything)
+    everything = drawn(cases(), arguments.seed)
     chosen = everything[arguments.first : arguments.first + arguments.count]
     counts, bad = collections.Counter[str](), []
     for case, ending, text in run(chosen):

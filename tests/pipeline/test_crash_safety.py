@@ -84,8 +84,15 @@ def heed_interrupts():
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def test_interrupt_from_a_terminal_reaches_all_processes_and_is_one_line(
-    reference, tmp_path
+@pytest.mark.parametrize(
+    ("number", "status", "said_first"),
+    [
+        (signal.SIGINT, 130, "gensig: interrupted;"),
+        (signal.SIGTERM, 143, "gensig: stopped by SIGTERM;"),
+    ],
+)
+def test_a_signal_to_all_processes_is_one_line(
+    reference, tmp_path, number, status, said_first
 ):
     out = tmp_path / "data"
     words = ["generate", "--quiet", *TINY, "executor.n_workers=2", f"out={out}"]
@@ -100,10 +107,12 @@ def test_interrupt_from_a_terminal_reaches_all_processes_and_is_one_line(
         assert process.poll() is None
         time.sleep(0.01)
     time.sleep(0.3)  # its workers are importing now
-    os.killpg(process.pid, signal.SIGINT)
+    os.killpg(process.pid, number)
     _, said = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert [line[:20] for line in said.splitlines()] == ["gensig: interrupted;"]
+    assert process.returncode == status
+    (line,) = said.splitlines()
+    assert line.startswith(said_first)
+    assert line.endswith(f"and gensig resume {out} finishes it")
     deadline = time.monotonic() + 10.0
     while left := alive_in_group(process.pid):
         assert time.monotonic() < deadline, left
