@@ -254,3 +254,18 @@ def test_an_interruption_without_a_data_set_names_none(monkeypatch, capsys):
     monkeypatch.setattr("gensig.commands.options.groups", interrupt)
     assert main(["options"]) == 130
     assert capsys.readouterr().err == f"gensig: interrupted; {AGAIN}\n"
+
+
+def test_quiet_shows_no_note_and_no_result(tmp_path, capsys):
+    """Notes of the plan and of typed words, results, and a set that is complete already."""
+    out = str(tmp_path / "data")
+    words = ["solver.max_error=null", "solver.oversampling=2", "executor.n_workers=1"]
+    generate = ["generate", *TINY, *words, f"out={out}"]
+    assert main([*generate, "--quiet"]) == 0
+    assert main(["resume", out, "--quiet"]) == 0
+    printed = capsys.readouterr()
+    assert (printed.out, printed.err) == ("", "")
+    assert main(["resume", out]) == 0
+    assert "is complete" in capsys.readouterr().out
+    assert main(["resume", f"{out}/none", "--quiet"]) == 2  # a mistake is said all the same
+    assert capsys.readouterr().err.startswith("gensig: ")
