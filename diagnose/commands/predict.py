@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -130,6 +131,7 @@ def run(arguments: Namespace) -> int:
     """Print the answers; exit status 3 if a recording is unlike the training data."""
     from diagnose.recordings.predict import predict_recording
     from diagnose.recordings.registry import open_network, shipped_network
+    from diagnose.training.carried import BY_CHECKSUM
     from diagnose.training.store import load_domain
 
     sources = _sources(arguments)
@@ -143,6 +145,9 @@ def run(arguments: Namespace) -> int:
         raise ConfigError(
             f"--held-out: {folder} knows of no implants (trained on none, or too old); leave it out"
         )
+    carried = network.description.carried
+    if carried is not None and not carried.fingerprints:
+        print(f"diagnose: note: {BY_CHECKSUM}", file=sys.stderr)
     domain = load_domain(folder, network.description)
     if arguments.plot:
         _plot(arguments.plot, network, sources[0])

@@ -16,9 +16,18 @@ from numpy.typing import NDArray
 
 from diagnose.data.windows import Segments, Task, subset_segments
 from gensig.dataset.folder.joining import IMPLANTS
+from gensig.dataset.folder.layout import FINGERPRINTS, read_config
 from gensig.errors import DatasetError
-from gensig.implants.blocks import Block, blocks_content, read_blocks, refuse_carried
+from gensig.implants.blocks import Block, blocks_content, read_blocks
 from gensig.implants.carriers import samples_digest
+from gensig.implants.fingerprints import (
+    Fingerprint,
+    Known,
+    fingerprints_content,
+    fingerprints_from,
+    known_alike,
+    known_in,
+)
 from gensig.signals.recording import Recording
 
 if TYPE_CHECKING:
@@ -27,6 +36,11 @@ if TYPE_CHECKING:
 SEEN = ("train", "validation")  # parts of a split that a training looks at
 HELD_OUT = "--held-out"
 DIGITS_OF_A_DIGEST = 64
+SLACK = 2e-3  # s, of a stretch that is found by fingerprints
+BY_CHECKSUM = (
+    "this model is of an earlier version: it knows the recordings that carried in its training by "
+    "their checksums alone, not where they were cut, resampled or rounded; train it again"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,10 +51,12 @@ class Carried:
     ----------
     blocks : all of its data set, those held out too
     seen : numbers of the blocks whose records were in its training or validation
+    fingerprints : of the recordings; none in models of earlier versions
     """
 
     blocks: tuple[Block, ...]
     seen: tuple[int, ...]
+    fingerprints: tuple[Fingerprint, ...] = ()
 
     def __post_init__(self) -> None:
         carrying = {block.number for block in self.blocks if block.carries}
@@ -58,16 +74,50 @@ class Carried:
 
     def content(self) -> dict[str, Any]:
         """Plain values, as ``model.json`` holds them."""
-        return {"blocks": blocks_content(self.blocks), "seen": list(self.seen)}
+        return {
+            "blocks": blocks_content(self.blocks),
+            "seen": list(self.seen),
+            FINGERPRINTS: fingerprints_content(self.fingerprints),
+        }
 
-    def of_recording(self, digests: frozenset[str]) -> tuple[Block, ...]:
-        """Blocks of the recording that has one of the digests, from its first sample on."""
+    def of_recording(
+        self, digests: frozenset[str], recording: Recording
+    ) -> tuple[Block, ...]:
+        """Blocks that lie in a recording, in its samples, from its first sample on.
+
+        Those of the recording that has one of the digests; else of those whose fingerprints it
+        shows, wherever and at whatever rate.
+        """
         own = [
             block
             for block in self.blocks
             if digests & {block.sha256, block.samples_sha256}
         ]
+        if not own:
+            for known in known_in(recording, self.fingerprints):
+                own += [
+                    _placed(block, known, recording.sampling_rate)
+                    for block in self.blocks
+                    if block.samples_sha256 == known.samples_sha256
+                ]
         return tuple(sorted(own, key=lambda block: block.start))
+
+
+def _placed(block: Block, known: Known, sampling_rate: float) -> Block:
+    """A block in the samples of a recording that holds a part of its own.
+
+    Of a block that carried `SLACK` is left out at both ends; one held out begins and ends later.
+    """
+
+    def sample(of_block: int, slack: float) -> int:
+        time = of_block / known.sampling_rate - known.delay + slack
+        return round(time * sampling_rate)
+
+    return replace(
+        block,
+        start=max(sample(block.start, SLACK), 0),
+        stop=max(sample(block.stop, -SLACK if block.carries else SLACK), 0),
+    )
 
 
 def is_digest(text: str) -> bool:
@@ -87,9 +137,11 @@ def carried_from(content: Mapping[str, Any]) -> Carried:
             if not isinstance(entry["carries"], bool):
                 raise ValueError(f"carries {entry['carries']!r} is not true or false")
         blocks = read_blocks({IMPLANTS: content})
+        fingerprints = fingerprints_from(content.get(FINGERPRINTS, ()))
     except (DatasetError, KeyError, TypeError) as error:
         raise ValueError(f"its blocks of implants are damaged: {error}") from None
-    return Carried(blocks=blocks, seen=tuple(int(number) for number in content["seen"]))
+    seen = tuple(int(number) for number in content["seen"])
+    return Carried(blocks=blocks, seen=seen, fingerprints=fingerprints)
 
 
 def carried_in(task: Task, protocol: str) -> Carried | None:
@@ -102,7 +154,22 @@ def carried_in(task: Task, protocol: str) -> Carried | None:
     )
     names = _block_names(task.dataset, records)
     seen = tuple(block.number for block in blocks if block.name in names)
-    return Carried(blocks=blocks, seen=seen)
+    return Carried(
+        blocks=blocks, seen=seen, fingerprints=stored_fingerprints(task.dataset)
+    )
+
+
+def stored_fingerprints(dataset: Dataset) -> tuple[Fingerprint, ...]:
+    """Fingerprints of the recordings that carry a set of implants; none in older sets.
+
+    Raises
+    ------
+    DatasetError    for fingerprints that are damaged
+    """
+    try:
+        return fingerprints_from(read_config(dataset.folder).get(FINGERPRINTS, ()))
+    except ValueError as error:
+        raise DatasetError(f"{dataset.folder}: config.yaml: {error}") from None
 
 
 def blocks_of(dataset: Dataset) -> tuple[Block, ...]:
@@ -131,8 +198,8 @@ def refuse_seen(carried: Carried | None, dataset: Dataset, segments: Segments) -
     known = [block for block in carried.blocks if block.number in carried.seen]
     overlapping = {
         block.name: block
-        for block in blocks_of(dataset)
-        if any(_overlap(block, other) for other in known)
+        for block, placed in _in_training(carried, dataset)
+        if any(_overlap(placed, other) for other in known)
     }
     names = np.asarray(dataset.column("unit_id"))[segments.record]
     records = segments.record[np.isin(names, list(overlapping))]
@@ -144,6 +211,39 @@ def refuse_seen(carried: Carried | None, dataset: Dataset, segments: Segments) -
         f"records lie on stretches that carried implants in the training of this model (samples "
         f"{first.start} to {first.stop} of {first.file}), and a score on them is memory; judge "
         "the test part of its own split, or implants in other recordings"
+    )
+
+
+def _in_training(carried: Carried, dataset: Dataset) -> list[tuple[Block, Block]]:
+    """Blocks of a set of implants, each as it is and in the samples of a training's recordings."""
+    blocks = blocks_of(dataset)
+    pairs = [(block, block) for block in blocks]
+    trained_on = {block.samples_sha256 for block in carried.blocks}
+    others = {block.samples_sha256 for block in blocks} - trained_on
+    if not (others and carried.fingerprints):
+        return pairs
+    prints = stored_fingerprints(dataset)
+    for digest in others:
+        asked = [each for each in prints if each.samples_sha256 == digest]
+        for known in known_alike(asked, carried.fingerprints):
+            pairs += [
+                (block, _in_its_samples(block, known, asked[0].sampling_rate))
+                for block in blocks
+                if block.samples_sha256 == digest
+            ]
+    return pairs
+
+
+def _in_its_samples(block: Block, known: Known, sampling_rate: float) -> Block:
+    """A block in the samples of the known recording, without `SLACK` at both ends."""
+    start = block.start / sampling_rate + known.delay + SLACK
+    stop = block.stop / sampling_rate + known.delay - SLACK
+    return replace(
+        block,
+        sha256=known.samples_sha256,
+        samples_sha256=known.samples_sha256,
+        start=round(start * known.sampling_rate),
+        stop=round(stop * known.sampling_rate),
     )
 
 
@@ -224,8 +324,8 @@ def held_out_stretch(
     n_samples = recording.acceleration.shape[1]
     own = [
         replace(block, stop=min(block.stop, n_samples))
-        for block in carried.of_recording(digests)
-        if block.start < n_samples
+        for block in carried.of_recording(digests, recording)
+        if block.start < min(block.stop, n_samples)
     ]
     n_carried = sum(block.stop - block.start for block in own if block.carries)
     if not n_carried:
@@ -248,8 +348,6 @@ def held_out_stretch(
         raise DatasetError(
             f"{said}; held out are its {stretch.text}: give {HELD_OUT} to score these alone"
         )
-    for digest in digests:
-        refuse_carried(own, digest, start=stretch.start, stop=stretch.stop, name=file)
     return stretch
 
 

@@ -17,6 +17,7 @@ from gensig.dataset.columns import GEAR_NAMES, GEAR_PINION_TURNS, GEAR_TEETH
 from gensig.dataset.folder.beginning import create_folder
 from gensig.dataset.folder.joining import IMPLANTS
 from gensig.dataset.folder.layout import (
+    FINGERPRINTS,
     OVERRIDES,
     PLAN,
     ConfigContent,
@@ -37,6 +38,7 @@ from gensig.dataset.storage.shard import ShardWriter
 from gensig.errors import DatasetError
 from gensig.execution.local import LocalExecutor
 from gensig.implants.blocks import blocks_content
+from gensig.implants.fingerprints import fingerprints_content, fingerprints_of
 from gensig.implants.implant_sources import (
     ImplantSources,
     open_implanter,
@@ -65,7 +67,7 @@ def begin_implants(out: Path, implanter: Implanter, sources: ImplantSources) -> 
     plan, config = implanter.plan.table, configuration(implanter)
     create_folder(
         out,
-        config=config,
+        config=config | {FINGERPRINTS: _fingerprints(implanter)},
         overrides=source_words(sources, out),
         plan=plan,
         identity=identity_hash(config, __version__),
@@ -211,7 +213,7 @@ IMPLANTING = Maker(plan=_planned_again, check=_check, write=write_implant_shard)
 
 
 def configuration(implanter: Implanter) -> dict[str, Any]:
-    """Content of ``config.yaml``: all that decides the bits, and all blocks."""
+    """Content of ``config.yaml`` without fingerprints: all that decides the bits, and all blocks."""
     options, manifest = implanter.options, implanter.pairs.data.manifest
     recordings = [
         {
@@ -247,6 +249,14 @@ def configuration(implanter: Implanter) -> dict[str, Any]:
             "blocks": blocks_content(implanter.cut.blocks),
         },
     }
+
+
+def _fingerprints(implanter: Implanter) -> list[dict[str, Any]]:
+    """Fingerprints of all recordings, as plain values."""
+    recordings = {
+        carrier.samples_sha256: carrier.recording for carrier in implanter.carriers
+    }
+    return fingerprints_content(fingerprints_of(recordings))
 
 
 def _attributes(implanter: Implanter) -> dict[str, Attribute]:

@@ -25,6 +25,9 @@ LOG = "run.log"
 SHARDS = "shards"
 SPLITS = "splits"
 FIGURES = "figures"
+FINGERPRINTS = (
+    "fingerprints"  # section of config.yaml, of recordings that carry implants
+)
 BEGINNING = ".beginning"  # in a folder that has no manifest yet
 NAMES = (
     MANIFEST,

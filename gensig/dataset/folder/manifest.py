@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gensig.dataset.folder.layout import (
+    FINGERPRINTS,
     ConfigContent,
     Manifest,
     ShardEntry,
@@ -32,7 +33,7 @@ __all__ = [
 ]
 
 # These change where and how a data set is made, not one bit of it.
-NOT_IDENTITY = ("out", "executor", "verbosity")
+NOT_IDENTITY = ("out", "executor", "verbosity", FINGERPRINTS)
 # Keys that came after 0.9.0 and their values where they are missing. At that value they are not
 # stored and no part of the identity: a folder that was begun without the key is the same data set.
 SINCE_0_9 = {
