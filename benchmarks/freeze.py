@@ -18,8 +18,9 @@ import numpy as np
 
 from diagnose.baselines.base import Role
 from diagnose.baselines.registry import baseline_names
+from diagnose.studies.baseline_runs import LABEL_SHUFFLE
 from diagnose.studies.benchmark import Benchmark, sha256, signal_rms
-from diagnose.studies.jobs import LABEL_SHUFFLE, ORACLE_NETWORK, SHAM
+from diagnose.studies.jobs import ORACLE_NETWORK, SHAM
 from diagnose.studies.study import is_leaky
 from gensig.dataset.reader import open_dataset
 
@@ -27,7 +28,6 @@ FOLDER = Path(__file__).parents[1] / "diagnose" / "frozen"
 N_RECORDS = 20  # whose RMS is kept
 DIGITS = 9
 CONTROLS = {
-    LABEL_SHUFFLE,
     SHAM,
     ORACLE_NETWORK,
     *baseline_names(Role.AT_CHANCE, Role.FOLLOWER, Role.BOUND),
@@ -70,7 +70,9 @@ def _results(report: Path) -> dict[str, dict[str, dict[str, float]]]:
                 for key in ("mean", "low", "high")
             }
             for method, values in result["methods"].items()
-            if isinstance(values["balanced_accuracy"], dict) and method not in CONTROLS
+            if isinstance(values["balanced_accuracy"], dict)
+            and method not in CONTROLS
+            and not method.startswith(LABEL_SHUFFLE)
         }
         for protocol, result in metrics["protocols"].items()
         if not is_leaky(protocol)

@@ -11,6 +11,7 @@ from diagnose.scoring.detection_limit import FALSE_ALARMS, too_few_for_curve
 from diagnose.scoring.judged import interval_text, too_few_text
 from diagnose.scoring.metrics import is_above
 from diagnose.studies.result_files import Content
+from diagnose.studies.verdicts import failed_controls
 from gensig.text.page import Section, Table
 from gensig.text.parameters import size_words
 
@@ -134,7 +135,8 @@ def _detection(metrics: Content) -> Content | None:
     if protocol is None:
         return None
     answers = metrics["protocols"][protocol]["answers"]
-    if "detection" not in answers:
+    failed = failed_controls(metrics["protocols"][protocol], metrics["model"])
+    if failed or "detection" not in answers:
         return None
     result: Content = answers["detection"][answers["network"]]
     return result

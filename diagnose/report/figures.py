@@ -9,6 +9,7 @@ import numpy as np
 
 from diagnose.report.panels import COLORS, MARKERS, panels, save, spaced
 from diagnose.studies.result_files import Content
+from diagnose.studies.verdicts import failed_controls
 
 WIDEST = 16.0  # inches, of a figure of scores
 
@@ -64,6 +65,7 @@ def scores_figure(path: Path, metrics: Content) -> None:
         scores = {
             name: method["balanced_accuracy"]
             for name, method in result["methods"].items()
+            if not failed_controls(result, name)
         }
         panel.axvline(scores["chance"], color="0.4", linestyle=":")
         for row, name in enumerate(methods):

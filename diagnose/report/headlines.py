@@ -7,6 +7,7 @@ from diagnose.report.methods import CHANCE, REFERENCE_TEXT
 from diagnose.scoring.judged import interval_text
 from diagnose.studies.protocol_results import main_protocol
 from diagnose.studies.result_files import Content
+from diagnose.studies.verdicts import failed_controls
 
 UNKNOWN_MACHINE = "unknown machine"
 CONDITIONS = {
@@ -26,10 +27,17 @@ def headlines(metrics: Content) -> list[str]:
     if result is None:
         return []
     methods = result["methods"]
+    failed = failed_controls(result, metrics["model"])
+    if failed:
+        return [f"{UNKNOWN_MACHINE}: no score, a control failed: {failed}"]
     chance = f"chance {methods[CHANCE]['balanced_accuracy']:.2f}"
     network = interval_text(methods[metrics["model"]]["balanced_accuracy"])
     lines = [f"{UNKNOWN_MACHINE}: balanced accuracy {network}, {chance}"]
-    if REFERENCE_TEXT.name in methods:
+    if failed := failed_controls(result, REFERENCE_TEXT.name):
+        lines.append(
+            f"{UNKNOWN_MACHINE} with a sound record: no score, a control failed: {failed}"
+        )
+    elif REFERENCE_TEXT.name in methods:
         score = interval_text(methods[REFERENCE_TEXT.name]["balanced_accuracy"])
         condition = CONDITIONS[metrics["settings"]["reference"]]
         lines.append(

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from diagnose.baselines.base import MethodText, Role
 from diagnose.baselines.registry import BASELINES
+from diagnose.studies.baseline_runs import LABEL_SHUFFLE, shuffle_method
 from diagnose.studies.jobs import (
-    LABEL_SHUFFLE,
     LEVEL_KEPT,
     ORACLE,
     ORACLE_NETWORK,
@@ -98,8 +98,13 @@ def controls_at_chance() -> dict[str, str]:
     """Labels of every control that must be at chance, a rival's counterpart on the sham set too."""
     rivals = baseline_texts(Role.RIVAL)
     shams = {sham_method(text.name, ""): f"{SHAM}, {text.label}" for text in rivals}
+    shuffles = {
+        shuffle_method(text.name): f"{SHUFFLE_TEXT.label}, {text.label}"
+        for text in (REFERENCE_TEXT, LEVEL_TEXT, *rivals)
+    }
     return {
         SHUFFLE_TEXT.name: SHUFFLE_TEXT.label,
+        **shuffles,
         **{text.name: text.label for text in baseline_texts(Role.AT_CHANCE)},
         SHAM: f"{SHAM}, network",
         **shams,

@@ -29,7 +29,7 @@ from diagnose.report.text import (
     made_by,
     recall_table,
     resampled_sentence,
-    score_cell,
+    shown_score,
     trust_table,
 )
 from diagnose.studies.result_files import Content, write_metrics
@@ -147,7 +147,7 @@ def _score_table(metrics: Content) -> Table:
     }
     rows = []
     for protocol, result in results:
-        cells = [score_cell(result["methods"].get(name)) for name in columns]
+        cells = [shown_score(result, name) for name in columns]
         rows.append([protocol, *cells])
     return Table(
         head=["protocol", *columns.values()],

@@ -12,9 +12,11 @@ from diagnose.scoring.judged import drawn_text, interval_text, too_few_text
 from diagnose.scoring.machines import LEAST_UNITS, MACHINES, Support
 from diagnose.scoring.metrics import is_above
 from diagnose.studies.result_files import Content
+from diagnose.studies.verdicts import failed_controls
 from gensig.text.page import Card, Section, Table
 
 FEW_UNITS = 10
+WITHHELD = "withheld: a control failed"
 CONFUSED = 0.1
 TRUST_HEAD = (
     "protocol",
@@ -35,6 +37,13 @@ def score_cell(method: Content | None) -> str:
     if isinstance(value, float):
         return f"{value:.2f}"
     return interval_text(value)
+
+
+def shown_score(result: Content, method: str) -> str:
+    """Score of a method on a protocol; withheld where one of its controls failed."""
+    if failed_controls(result, method):
+        return WITHHELD
+    return score_cell(result["methods"].get(method))
 
 
 def data_line(metrics: Content) -> str:
@@ -74,15 +83,18 @@ def answer_card(name: str, result: Content, model: str, meaning: str) -> Card:
     score = methods[model]["balanced_accuracy"]
     chance = methods["chance"]["balanced_accuracy"]
     mark = "bad"
+    value, spread = f"{score['mean']:.2f}", _spread(score)
     verdict, leak = _verdict(result, score, chance)
     if is_above(score, chance) and not leak:
         mark = "good"
+    if failed := failed_controls(result, model):
+        value, spread, verdict = "-", WITHHELD, [failed]
     if not meaning.startswith("tested"):
         meaning = f"tested {meaning}"
     return Card(
         title=name,
-        value=f"{score['mean']:.2f}",
-        spread=_spread(score),
+        value=value,
+        spread=spread,
         verdict="; ".join(verdict),
         meaning=f"{meaning[0].upper()}{meaning[1:]}.",
         mark=mark,
@@ -137,7 +149,7 @@ def _verdict(result: Content, score: Content, chance: float) -> tuple[list[str],
     else:
         lines = [f"not distinguishable from chance ({chance:.2f})"]
     if score["low"] is not None:
-        lines += _best_rival(methods, score)
+        lines += _best_rival(result, score)
     if "oracle" in methods:
         share = result["over_oracle"]["balanced_accuracy"]
         best = methods["oracle"]["balanced_accuracy"]["mean"]
@@ -158,12 +170,16 @@ def _verdict(result: Content, score: Content, chance: float) -> tuple[list[str],
     return lines, leak
 
 
-def _best_rival(methods: Content, score: Content) -> list[str]:
-    """Comparison of the network's score with the best baseline; empty where none ran."""
+def _best_rival(result: Content, score: Content) -> list[str]:
+    """Comparison of the network's score with the best baseline; empty where none ran.
+
+    A baseline whose control failed is none.
+    """
+    methods = result["methods"]
     means = {
         label: methods[name]["balanced_accuracy"]["mean"]
         for name, label in rivals_on_cards().items()
-        if name in methods
+        if name in methods and not failed_controls(result, name)
     }
     if not means:
         return []
@@ -275,6 +291,9 @@ def caveats(metrics: Content) -> list[str]:
         "Simulated vibration. A score here says nothing yet about measured machines."
     ]
     for name, result in metrics["protocols"].items():
+        for method in result.get("controls", {}):
+            if failed := failed_controls(result, method):
+                lines.append(f"{method} has no score on {name}: {failed}.")
         support = fewest(result)
         kind, n_groups = support.kind, support.n_groups
         if support.too_few:

@@ -53,6 +53,8 @@ class Prediction:
         (record,) the labels by the weights of the last epoch
     heads : of a network that has them, `diagnose.training.heads.predict_heads`
     entries : of a network on teeth, `diagnose.training.entries.predict_entries`
+    n_followed : answers that are the random label of their record, see
+        `diagnose.studies.canaries`; None where no labels were random
     """
 
     protocol: str
@@ -71,6 +73,7 @@ class Prediction:
     last_predicted: IntArray | None = None
     heads: Mapping[str, FloatArray] = field(default_factory=dict)
     entries: Mapping[str, FloatArray] = field(default_factory=dict)
+    n_followed: int | None = None
 
     @property
     def predicted(self) -> IntArray:

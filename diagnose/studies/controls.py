@@ -78,6 +78,13 @@ def control_jobs(
             for control, of_control in seeds.items()
             for seed in of_control
         ]
+        if settings.shuffle_control:
+            jobs += [
+                Job(protocols=(protocol,), seed=seed, control=control, shuffled=True)
+                for control in (LEVEL_KEPT, WITH_REFERENCE)
+                if control in seeds
+                for seed in few
+            ]
     return jobs
 
 

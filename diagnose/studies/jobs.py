@@ -24,7 +24,12 @@ from diagnose.networks.registry import input_of
 from diagnose.scoring.metrics import over_records
 from diagnose.scoring.predictions import Prediction, Rows
 from diagnose.settings import TrainSettings
-from diagnose.studies.baseline_runs import baseline_predictions
+from diagnose.studies.baseline_runs import (
+    LABEL_SHUFFLE,
+    baseline_predictions,
+    shuffle_method,
+)
+from diagnose.studies.canaries import canary_labels, counted, with_canaries
 from diagnose.studies.novelty import (
     NoveltyRun,
     fitted_runs,
@@ -46,7 +51,7 @@ PROBE, ORACLE, SHAM, LEVEL_KEPT = "probe", "oracle", "sham", "level_kept"
 WITH_REFERENCE = "with_reference"
 WINDOWS = Windows()
 # Names of trained controls in metrics.json; those of `SHAM` and `LEVEL_KEPT` are the same.
-LABEL_SHUFFLE, ORACLE_NETWORK = "label_shuffle", "oracle_network"
+ORACLE_NETWORK = "oracle_network"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,10 +151,13 @@ def _run_training(
     if control == WITH_REFERENCE:
         settings = with_reference(settings)
     sets = _windows(task, protocol, control, input_of(settings.model))
-    train, validation, test = (sets[subset] for subset in SUBSETS)
+    canaries = canary_labels(task, protocol)
+    train, validation, test = (
+        with_canaries(sets[subset], canaries) for subset in SUBSETS
+    )
     variant, method = control, _method(settings, control)
     if shuffled:
-        variant = method = LABEL_SHUFFLE
+        variant = method = shuffle_method(control) if control else LABEL_SHUFFLE
         settings = replace(settings, patience=0)
         rng = np.random.default_rng([seed, 2])
         train = with_shuffled_labels(train, n_classes, rng)
@@ -181,6 +189,7 @@ def _run_training(
         temperature=training.temperature,
         last_predicted=scores.argmax(axis=1),
     )
+    prediction = counted(prediction, canaries)
     if shuffled:
         return prediction
     prediction = _with_further_answers(prediction, training, test)
@@ -230,7 +239,8 @@ def _run_baselines(task: Task, settings: TrainSettings, job: Job) -> list[Predic
             windows=partial(_windows, task, protocol),
             caches=caches,
         )
-        predictions += baseline_predictions(source, names)
+        shuffled = not job.control and settings.shuffle_control
+        predictions += baseline_predictions(source, names, shuffled=shuffled)
     if job.control != SHAM:
         return predictions
     network = network_name(settings)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from diagnose.scoring.metrics import (
 from diagnose.scoring.predictions import Prediction
 from diagnose.settings import TrainSettings
 from diagnose.studies.answers import protocol_answers
+from diagnose.studies.baseline_runs import LABEL_SHUFFLE
 from diagnose.studies.controls import chosen_oracle
 from diagnose.studies.counts import (
     by_method,
@@ -32,8 +34,9 @@ from diagnose.studies.counts import (
     run_notes,
     unit_ids,
 )
-from diagnose.studies.jobs import LABEL_SHUFFLE, ORACLE
-from diagnose.studies.result_files import Entry, network_name
+from diagnose.studies.jobs import ORACLE
+from diagnose.studies.result_files import Content, Entry, network_name
+from diagnose.studies.verdicts import control_verdicts
 from diagnose.training.entries import entry_scores
 from diagnose.training.heads import head_scores
 
@@ -121,6 +124,7 @@ def protocol_result(
     settings: TrainSettings,
     protocol: str,
     predictions: Sequence[Prediction],
+    shams: Content = MappingProxyType({}),
 ) -> Entry:
     """Entry of a protocol in ``metrics.json``.
 
@@ -128,6 +132,7 @@ def protocol_result(
     ----------
     task, settings : of the study
     predictions : of all protocols
+    shams : scores of the trainings on the sham data set
     """
     runs = by_method(predictions, protocol)
     methods = {
@@ -141,9 +146,15 @@ def protocol_result(
     if oracle is not None:
         methods[ORACLE] = {**methods[oracle], "chosen": oracle}
         over_oracle = _over_oracle(task, settings, network, runs[oracle])
-    answers = None
+    methods |= shams
+    answers, controls = None, {}
     if not is_leaky(protocol):
-        answers = protocol_answers(task, settings, mine)
+        name = network_name(settings)
+        controls = control_verdicts(methods, runs, name)
+        compared = [
+            run for run in mine if run.method == name or _holds(controls, run.method)
+        ]
+        answers = protocol_answers(task, settings, compared)
     parts = part_records(task, protocol)
     return {
         "leaky": is_leaky(protocol),
@@ -154,6 +165,7 @@ def protocol_result(
         **part_sizes(task, parts),
         "resampled": machines_of(task.dataset, parts["test"]).counts(),
         "methods": methods,
+        "controls": controls,
         "over_oracle": over_oracle,
         "validation_loss": [list(run.validation_loss) for run in network],
         "best_epoch": [run.best_epoch for run in network],
@@ -166,6 +178,11 @@ def protocol_result(
         "by_gear": _by_gear(task, settings, network),
         "answers": answers,
     }
+
+
+def _holds(controls: Content, method: str) -> bool:
+    """False for a method with a control that failed."""
+    return method not in controls or bool(controls[method]["holds"])
 
 
 def _entry(task: Task, settings: TrainSettings, network: Sequence[Prediction]) -> Entry:
@@ -200,7 +217,7 @@ def _method_result(
     task: Task, settings: TrainSettings, method: str, runs: Sequence[Prediction]
 ) -> Entry:
     pairs = [(run.record, run.predicted) for run in runs]
-    shuffled = method == LABEL_SHUFFLE
+    shuffled = method.startswith(LABEL_SHUFFLE)
     scores = score_predictions(task, pairs, settings.n_bootstrap, shuffled=shuffled)
     return {**scores, **run_notes(runs)}
 

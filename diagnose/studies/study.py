@@ -226,6 +226,8 @@ def run_study(
     if novelty:
         write_novelty(folder / "novelty.csv", task, novelty)
     n_bootstrap = settings.n_bootstrap
+    score = functools.partial(score_predictions, n_bootstrap=n_bootstrap)
+    shams = sham_methods(task, settings, predictions, score)
     results: Entry = {}
     novelty_results: Entry = {}
     for name in protocols:
@@ -234,11 +236,10 @@ def run_study(
                 task, name, novelty, n_bootstrap=n_bootstrap, seed=BOOTSTRAP_SEED
             )
         else:
-            results[name] = protocol_result(task, settings, name, on_data)
+            results[name] = protocol_result(
+                task, settings, name, on_data, shams.get(name, {})
+            )
     _add_leaks(task, settings, results, on_data)
-    score = functools.partial(score_predictions, n_bootstrap=n_bootstrap)
-    for protocol, methods in sham_methods(task, settings, predictions, score).items():
-        results[protocol]["methods"] |= methods
     if settings.tensorboard:
         write_scores(folder, results)
     return {

@@ -129,29 +129,36 @@ def with_shuffled_labels(
     n_classes: int,
     rng: np.random.Generator,
 ) -> WindowSet:
-    """Windows whose labels do not depend on the class, one label a record.
+    """Windows with labels of `shuffled_labels`.
 
     Of the other targets only the entry of a tooth is kept, which tells nothing of a fault.
+    """
+    label = shuffled_labels(windows.label, windows.record, n_classes, rng)
+    kept = {name: windows.targets[name] for name in ENTRY if name in windows.targets}
+    return replace(windows, label=label, targets=kept)
+
+
+def shuffled_labels(
+    label: IntArray, record: IntArray, n_classes: int, rng: np.random.Generator
+) -> IntArray:
+    """Labels (row,) that do not depend on the class, one label a record.
 
     Within each true class all labels have the same shares, in random order. A plain permutation
     leaves every class a majority label by chance, and a network that finds the classes then
     scores 0, 1/4, 1/2, ... at random.
     """
-    _, first, position = np.unique(
-        windows.record, return_index=True, return_inverse=True
-    )
-    true = windows.label[first]
+    _, first, position = np.unique(record, return_index=True, return_inverse=True)
+    true = label[first]
     share = np.bincount(true, minlength=n_classes) / true.size
     shuffled = np.empty_like(true)
-    for label in np.unique(true):
-        members = np.flatnonzero(true == label)
+    for present in np.unique(true):
+        members = np.flatnonzero(true == present)
         counts = np.floor(share * members.size + 1e-9).astype(int)
         labels = np.repeat(np.arange(n_classes), counts)
         n_missing = members.size - labels.size
         extra = rng.permutation(np.flatnonzero(share > 0))[:n_missing]
         shuffled[members] = rng.permutation(np.concatenate([labels, extra]))
-    kept = {name: windows.targets[name] for name in ENTRY if name in windows.targets}
-    return replace(windows, label=shuffled[position], targets=kept)
+    return shuffled[position]
 
 
 def _mixed_precision(device: torch.device) -> torch.autocast:

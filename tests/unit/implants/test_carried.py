@@ -148,7 +148,7 @@ def test_it_is_known_in_another_form_and_what_was_held_out_is_scored(
     made, capsys, tmp_path, form
 ):
     file = tmp_path / "form.npz"
-    rate, first = rewritten(made, file, form)
+    _, first = rewritten(made, file, form)
     line = refused(capsys, "predict", "--model", model(made), file)
     assert "carried implants in the training of this model" in line
     said = json.loads(predict(made, capsys, file, "--held-out", "--json").out)

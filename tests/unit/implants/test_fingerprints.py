@@ -77,7 +77,7 @@ def steady(seed):
     """A machine of constant speed with hardly any noise: all its recordings sound alike."""
     time = np.arange(round(SECONDS * CARRIER_RATE)) / CARRIER_RATE
     rng = np.random.default_rng(seed)
-    orders = np.arange(80.0, 1500.0, 23.0)
+    orders = np.arange(80.0, 1500.0, 3.0)
     tones = np.cos(2 * np.pi * np.outer(orders, time + rng.uniform())).sum(axis=0)
     signal = tones + 1e-2 * rng.standard_normal(time.size)
     return replace(recording(0), acceleration=signal[None])
