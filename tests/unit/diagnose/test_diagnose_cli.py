@@ -76,6 +76,13 @@ def test_train_writes_what_it_promises(trained, by_unit):
         "rotation_probe",
         "chance",
     }
+    rivals = (
+        "indicators",
+        "indicators_without_level",
+        "rms_threshold",
+        "tooth_logistic",
+    )
+    judged |= {f"label_shuffle_{name}" for name in rivals}
     assert set(methods) == judged | probes
     for name in judged:
         value = methods[name]["balanced_accuracy"]

@@ -230,9 +230,10 @@ def test_every_control_has_its_jobs_and_only_on_clean_protocols():
     )
     task = task_from(small(twins=True), settings)
     jobs = control_jobs(task, settings, ["by_unit"])
-    networks = [("level_kept", 3), ("level_kept", 4), ("oracle", 3)]
+    networks = [("level_kept", 3), ("level_kept", 4), ("oracle", 3), ("level_kept", 3)]
     expected = [("probe", None), ("oracle", None), *networks]
     assert [(job.control, job.seed) for job in jobs] == expected
+    assert [job.shuffled for job in jobs] == [False] * (len(jobs) - 1) + [True]
     assert control_jobs(task, settings, []) == []
     off = settings_of(*FAST, "reference=none", "oracle=false", "metadata_probe=false")
     assert control_jobs(task, off, ["by_unit"]) == []
@@ -286,6 +287,7 @@ def test_a_study_with_all_of_them(complete):
     oracles = {"oracle_network", "oracle_indicators", "oracle_teeth"}
     others = {"label_shuffle", "metadata_probe", "level_kept"}
     others |= {"rotation_probe", "result_probe"}
+    others |= {"label_shuffle_rms_threshold", "label_shuffle_level_kept"}
     shams = {"sham", "sham_rms_threshold"}
     rest = {"cnn", "rms_threshold", "oracle", "chance"}
     assert set(methods) == oracles | others | shams | rest

@@ -32,14 +32,23 @@ HUGE = 1e6
 FASTER = 1.5  # a speed must stay one at which gears make whole turns
 AS_THEY_ARE = ("life_failed",)  # the same for all records of a life
 LEVEL_KEPT = "normalise=none"  # else no input is divided by the level of other records
-WORDS = (*TINY_CNN, LEVEL_KEPT, "minirocket_features=168", "epochs=2")
+# how many shuffles are drawn, the test decides
+NO_SHUFFLE = "shuffle_control=false"
+WORDS = (*TINY_CNN, LEVEL_KEPT, NO_SHUFFLE, "minirocket_features=168", "epochs=2")
 RIVALS = f"baselines=[{','.join(baseline_names(Role.RIVAL))}]"
 BASELINE_JOBS = tuple(
     Job(protocols=("by_unit",), seed=None, control=control)
     for control in ("", PROBE, ORACLE)
 )
 OPEN = ("healthy_only", "open_set")
-OF_TEST = ("record", "log_probability", "windows", "last_predicted", "predicted")
+OF_TEST = (
+    "record",
+    "log_probability",
+    "windows",
+    "last_predicted",
+    "predicted",
+    "n_followed",
+)
 
 
 class Poisoned:
