@@ -22,7 +22,11 @@ from gensig.driveline.mesh_phase import start_rolls
 from gensig.driveline.running import named_by_side
 from gensig.errors import ConfigError
 from gensig.life.root.strength import Strength
-from gensig.mesh.options import read_mesh_options, read_slice_options
+from gensig.mesh.options import (
+    read_mesh_options,
+    read_slice_options,
+    refuse_papers_heat,
+)
 from gensig.options.configuration import Configuration
 from gensig.sensing.manufacturing import Quality
 from gensig.systems.registry import read_material, read_modification
@@ -161,7 +165,7 @@ def read_mesh_strength(
     flanks = SlicedPair(
         pair=pair,
         material=read_material(config),
-        mesh=read_mesh_options(mesh_section),
+        mesh=refuse_papers_heat(read_mesh_options(mesh_section), "a drive line"),
         slices=read_slice_options(mesh_section),
         modification=modification,
         torque=0.0,

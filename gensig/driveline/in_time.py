@@ -18,7 +18,11 @@ from gensig.driveline.running import (
 )
 from gensig.driveline.teeth import ToothLaw, sound_meshes
 from gensig.driveline.time.newmark import LineSolver
-from gensig.mesh.options import read_mesh_options, read_slice_options
+from gensig.mesh.options import (
+    read_mesh_options,
+    read_slice_options,
+    refuse_papers_heat,
+)
 from gensig.options.configuration import Configuration
 from gensig.systems.registry import read_material
 
@@ -64,7 +68,7 @@ def tabulated_meshes(
     mesh = config["mesh"]
     law = ToothLaw(
         material=read_material(config),
-        options=read_mesh_options(mesh),
+        options=refuse_papers_heat(read_mesh_options(mesh), "a drive line"),
         slices=read_slice_options(mesh),
     )
     return sound_meshes(machine, law, mesh_forces(machine, speed, torque))

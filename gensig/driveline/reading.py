@@ -9,7 +9,11 @@ from gensig.driveline.hot_line import hot_line
 from gensig.driveline.machine import LineMachine
 from gensig.dynamics.integrator import Solver
 from gensig.errors import ConfigError
-from gensig.mesh.options import read_mesh_options, read_slice_options
+from gensig.mesh.options import (
+    read_mesh_options,
+    read_slice_options,
+    refuse_papers_heat,
+)
 from gensig.operation.options import read_operating
 from gensig.options.configuration import Configuration
 from gensig.sensing.chain import stands_for_channels
@@ -34,7 +38,9 @@ def read_line_machine(config: Configuration) -> LineMachine:
     )
     machine = LineMachine(
         material=read_material(config),
-        mesh=read_mesh_options(config.section("mesh")),
+        mesh=refuse_papers_heat(
+            read_mesh_options(config.section("mesh")), "a drive line"
+        ),
         operating=operating,
         sensing=read_sensing(config.section("sensing")),
         quality=quality,

@@ -213,7 +213,7 @@ IMPLANTING = Maker(plan=_planned_again, check=_check, write=write_implant_shard)
 
 
 def configuration(implanter: Implanter) -> dict[str, Any]:
-    """Content of ``config.yaml`` without fingerprints: all that decides the bits, and all blocks."""
+    """Content of ``config.yaml`` but fingerprints: what decides the bits, and all blocks."""
     options, manifest = implanter.options, implanter.pairs.data.manifest
     recordings = [
         {

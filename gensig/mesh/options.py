@@ -19,11 +19,25 @@ CHOICES = {
     "bending": ("by_slice", "whole"),
     "roll_torque": ("consistent", "classical"),
     "phase": ("rotation", "prescribed"),
+    "heat_law": (
+        "grown",
+        "paper",
+        "paper_misprints",
+        "paper_contact",
+        "paper_twice",
+        "paper_once",
+    ),
 }
 
 SLICE_COUPLINGS = ("coupled", "independent")
 MOST_SLICES = 1000
 
+# conventions of the equations of mesh.heat_law=paper: those that null stands for with them
+OF_PAPERS_HEAT = {
+    "elasticity": "plane_stress",
+    "body": "sainsot",
+    "tooth": "to_contact",
+}
 # conventions that null stands for, by law
 CONVENTIONS = {
     "paper": {
@@ -65,6 +79,8 @@ class MeshOptions:
         ``classical`` leaves that torque out
     phase : of the mesh follows the pinion's own ``rotation``, or is ``prescribed``, that of the set
         speed, as in equations with a given k(t); that goes with ``law=paper``
+    heat_law : teeth grow with heat by gensig's own law, ``grown``, or by a reading of the
+        equations of the thermal paper, ``gensig.mesh.thermal.paper_growth``
     damping_ratio : of the mesh mode at the mean mesh stiffness
     friction_coefficient : of the flanks; its sign passes through zero over ``friction_transition``
         base pitches
@@ -86,6 +102,7 @@ class MeshOptions:
     friction_transition: float
     points_per_pitch: int
     allow_extrapolation: bool
+    heat_law: str = "grown"
 
     def __post_init__(self) -> None:
         for key, allowed in CHOICES.items():
@@ -98,10 +115,23 @@ class MeshOptions:
                 f"mesh.phase = prescribed goes with mesh.law = paper, not {self.law}: the law of "
                 "one-sided contact follows the rotation of the gears; take mesh.phase=rotation"
             )
+        if self.has_papers_heat:
+            for key in ("body", "tooth"):
+                if getattr(self, key) != OF_PAPERS_HEAT[key]:
+                    raise ConfigError(
+                        f"mesh.heat_law = {self.heat_law} has the paper's tooth and body, not "
+                        f"mesh.{key} = {getattr(self, key)}; take mesh.{key}=null or "
+                        f"{OF_PAPERS_HEAT[key]}, or mesh.heat_law=grown"
+                    )
         _require_range(self, "damping_ratio", 0.0, 1.0)
         _require_range(self, "friction_coefficient", 0.0, 0.5)
         _require_range(self, "friction_transition", 1e-3, 0.5)
         _require_range(self, "points_per_pitch", 32, 8192)
+
+    @property
+    def has_papers_heat(self) -> bool:
+        """True if teeth grow with heat by the equations of the thermal paper."""
+        return self.heat_law != "grown"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,14 +179,31 @@ def read_slice_options(values: Section) -> SliceOptions:
     return read(SliceOptions, keys, "mesh")
 
 
+def refuse_papers_heat(options: MeshOptions, shown: str) -> MeshOptions:
+    """The options; ConfigError for ``mesh.heat_law=paper``, where teeth are not cut into slices.
+
+    Parameters
+    ----------
+    shown : the machine, as the error names it
+    """
+    if options.has_papers_heat:
+        raise ConfigError(
+            f"mesh.heat_law = {options.heat_law} is for system=helical_pair, which takes spur "
+            f"gears as well, not for {shown}; take it, or mesh.heat_law=grown"
+        )
+    return options
+
+
 def read_mesh_options(values: Section) -> MeshOptions:
-    """Options from boundary keys; a convention that is null follows ``law``."""
+    """Options from boundary keys; a convention that is null follows ``law`` and ``heat_law``."""
     convention = CONVENTIONS.get(str(values.get("law")))
     if convention is None:
         raise ConfigError(
             f"mesh.law = {values.get('law')!r}; allowed: {', '.join(CONVENTIONS)}"
         )
     keys = {key: value for key, value in values.items() if key not in SLICE_KEYS}
+    if keys.get("heat_law", "grown") != "grown":
+        convention = convention | OF_PAPERS_HEAT
     for key, value in convention.items():
         if keys.get(key) is None:
             keys[key] = value

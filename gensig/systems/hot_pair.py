@@ -27,6 +27,7 @@ from gensig.mesh.thermal.heat import (
     friction_heat,
     rolling_speeds,
 )
+from gensig.mesh.thermal.paper_growth import READINGS, PaperGrowth, gear_growth
 from gensig.mesh.thermal.thermal_growth import GearGrowth, PairGrowth
 from gensig.systems.sliced_pair import SlicedPair
 
@@ -34,6 +35,8 @@ Array = NDArray[np.float64]
 
 COLD, TRUE, CONTACT_RATIO = "cold", "true", "contact_ratio"
 APPARENT, SOFTENED = "apparent", "softened"
+PAPER, PAPER_HOUSED = "paper", "paper_contact_ratio"
+COLD_SUMS, PAPER_SUMS = "cold_components", "paper_components"
 N_FLASH_POSITIONS = 60
 
 
@@ -136,13 +139,46 @@ def hot_state(duty: Duty) -> HotState:
     )
 
 
+def paper_growth(duty: Duty, state: HotState) -> PaperGrowth:
+    """Growth of the teeth by the reading that ``mesh.heat_law`` names."""
+    system, heat = duty.system, duty.heat
+    name, pair = system.mesh.heat_law, system.pair
+    sides = {
+        side: gear_growth(
+            gear,
+            READINGS[name],
+            bore_rise=float(body.temperature[0]) - heat.reference_temperature,
+            tooth_rise=body.tooth - heat.reference_temperature,
+            expansion=heat.expansion,
+            poisson_ratio=system.material.poisson_ratio,
+        )
+        for (side, gear), body in zip(
+            pair.gears.items(), (state.pinion, state.wheel), strict=True
+        )
+    }
+    return PaperGrowth(
+        reading=name,
+        **sides,
+        flash_position=tuple(state.flash_position.tolist()),
+        flash_strain=tuple((heat.expansion * state.flash).tolist()),
+    )
+
+
 def heated(
-    duty: Duty, state: HotState, *, growth: bool, center_distance: bool, softening: bool
+    duty: Duty,
+    state: HotState,
+    *,
+    growth: bool,
+    center_distance: bool,
+    softening: bool,
+    papers: bool = False,
 ) -> SlicedPair:
     """The pair with chosen effects of heat.
 
     Parameters
     ----------
+    papers : growth is that of ``mesh.heat_law``, not gensig's own: the teeth alone grow, by the
+        paper's equations
     growth : the pair grows as a whole by the strain of its base pitches, housing and shafts alike;
         the remaining differences of its gears, in base pitch and between body and teeth, are a
         deviation of the flanks
@@ -156,7 +192,9 @@ def heated(
     system, heat = duty.system, duty.heat
     cold, material = system.pair, system.material
     strain = state.growth.strain(cold)
-    if growth:
+    if growth and papers:
+        system = replace(system, hot_teeth=paper_growth(duty, state))
+    elif growth:
         pair = _grown(cold, state.growth, strain)
         system = replace(system, pair=pair, growth=state.growth)
     if center_distance:
@@ -183,6 +221,7 @@ def as_configured(duty: Duty) -> SlicedPair:
         growth=heat.growth,
         center_distance=heat.center_distance,
         softening=heat.softening,
+        papers=duty.system.mesh.has_papers_heat,
     )
 
 
@@ -196,6 +235,9 @@ def stiffness_variants(duty: Duty, state: HotState) -> dict[str, Variant]:
         cold approach less the distance by which the teeth's growth separates the gears. A preload,
         not a stiffness. Left out if the growth is larger than the approach
     softened : as ``true``, with Young's modulus at temperature
+    paper : by the reading of the paper's equations that ``mesh.heat_law`` names
+    paper_contact_ratio : as ``paper``, the housing has its own temperature
+    cold_components, paper_components : cold, and as ``paper``, by the literal eq. (14)
     """
 
     def variant(*, center_distance: bool = False, softening: bool = False) -> Variant:
@@ -220,6 +262,27 @@ def stiffness_variants(duty: Duty, state: HotState) -> dict[str, Variant]:
         )
     if heat.softening:
         variants[SOFTENED] = variant(softening=True)
+    if duty.system.mesh.has_papers_heat:
+        variants |= _paper_variants(duty, state)
+    return variants
+
+
+def _paper_variants(duty: Duty, state: HotState) -> dict[str, Variant]:
+    """The variants of the paper's equations."""
+    effects = {"growth": True, "softening": False, "papers": True}
+    hot = heated(duty, state, center_distance=False, **effects)
+    variants = {PAPER: _variant(hot)}
+    if duty.heat.center_distance:
+        housed = heated(duty, state, center_distance=True, **effects)
+        variants[PAPER_HOUSED] = _variant(housed)
+    for name, system in ((COLD_SUMS, duty.system), (PAPER_SUMS, hot)):
+        mesh, single = system.component_sums()
+        variants[name] = replace(
+            _variant(system),
+            approach=system.mesh_force / mesh,
+            mesh=mesh,
+            single=single,
+        )
     return variants
 
 

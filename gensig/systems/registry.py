@@ -13,7 +13,11 @@ from gensig.geometry.contact import SIDES, GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.modification import FlankModification, PairModification, sound_teeth
-from gensig.mesh.options import read_mesh_options, read_slice_options
+from gensig.mesh.options import (
+    read_mesh_options,
+    read_slice_options,
+    refuse_papers_heat,
+)
 from gensig.mesh.thermal.heat import Heat
 from gensig.operation.options import read_operating
 from gensig.options.configuration import Configuration, Section
@@ -52,6 +56,7 @@ SYSTEM_KEYS = ("kind", "supports", "motor", "load")
 def read_spur_pair(config: Configuration) -> SpurPair:
     """Build a spur pair from the boundary keys of a configuration."""
     modification = read_modification(config)
+    refuse_papers_heat(read_mesh_options(config.section("mesh")), "system=spur_pair")
     gear = config.section("gear")
     if _number("gear.helix_angle_deg", gear["helix_angle_deg"]) != 0.0:
         raise ConfigError(
@@ -134,12 +139,23 @@ def read_duty(config: Configuration) -> Duty:
 
 
 def read_cold_pair(config: Configuration) -> SlicedPair:
-    """The sliced pair of a configuration without heat."""
+    """The sliced pair of a configuration without heat.
+
+    Raises
+    ------
+    ConfigError    for ``mesh.heat_law=paper`` where no teeth grow
+    """
     mesh = config.section("mesh")
+    options = read_mesh_options(mesh)
+    if options.has_papers_heat and not read_heat(config).growth:
+        raise ConfigError(
+            f"mesh.heat_law = {options.heat_law} is for teeth that grow with heat: take "
+            "heat=chongqing_rated or heat.growth=true, or mesh.heat_law=grown"
+        )
     return SlicedPair(
         pair=read_pair(config),
         material=read_material(config),
-        mesh=read_mesh_options(mesh),
+        mesh=options,
         slices=read_slice_options(mesh),
         modification=read_modification(config),
         torque=_number("operating.torque_nm", config.section("operating")["torque_nm"]),

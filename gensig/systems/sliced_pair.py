@@ -16,6 +16,11 @@ from gensig.material import Material
 from gensig.mesh.modification import PairModification
 from gensig.mesh.options import MeshOptions, SliceOptions
 from gensig.mesh.pair_table import node_positions
+from gensig.mesh.sliced.component_sum import (
+    component_compliances,
+    component_mesh_stiffness,
+    component_pair_stiffness,
+)
 from gensig.mesh.sliced.slice_pressure import contact_pressure
 from gensig.mesh.sliced.sliced_table import SlicedTable, sliced_table
 from gensig.mesh.sliced.slices import (
@@ -27,6 +32,7 @@ from gensig.mesh.sliced.slices import (
     slice_middles,
     sliced_mesh,
 )
+from gensig.mesh.thermal.paper_growth import PaperGrowth
 from gensig.mesh.thermal.thermal_growth import PairGrowth
 
 Array = NDArray[np.float64]
@@ -74,7 +80,7 @@ class SlicedPair:
     """A gear pair with sound teeth, its flank modification, and the pinion's torque in N m.
 
     ``growth`` is the deviation of flanks by heat, beyond the growth of the pair as a whole, see
-    ``gensig.systems.hot_pair``.
+    ``gensig.systems.hot_pair``. ``hot_teeth`` is the growth of teeth by ``mesh.heat_law=paper``.
     """
 
     pair: GearPair
@@ -84,6 +90,7 @@ class SlicedPair:
     modification: PairModification
     torque: float
     growth: PairGrowth | None = None
+    hot_teeth: PaperGrowth | None = None
 
     @property
     def mesh_force(self) -> float:
@@ -94,7 +101,13 @@ class SlicedPair:
         """The pair cut into slices, modified flanks and faulty teeth included."""
         options = self.material, self.mesh, self.slices
         deviation, teeth = self.deviation(), faulty_teeth(self.pair, faults)
-        return sliced_mesh(self.pair, *options, deviation=deviation, teeth=teeth)
+        return sliced_mesh(
+            self.pair,
+            *options,
+            deviation=deviation,
+            teeth=teeth,
+            hot_teeth=self.hot_teeth,
+        )
 
     def deviation(self) -> Array | None:
         """Recess of all flanks at the table's positions, (slice, node) m; None for perfect ones."""
@@ -180,6 +193,24 @@ class SlicedPair:
         position = np.linspace(0.0, last, n_positions)
         return position, single_pair_stiffness(mesh, position, self.mesh_force)
 
+    def component_sums(self, n_positions: int = 401) -> tuple[Array, Array]:
+        """Stiffness by the literal eq. (14) of the thermal paper, pairs added up.
+
+        Returns
+        -------
+        (phase,), (position,) N/m    of the mesh, 64 phases a period, and of one pair at the
+            positions of ``single_pair``
+        """
+        mesh = self.sliced_mesh()
+        components = component_compliances(mesh, self.material, self.hot_teeth)
+        at = mesh, components
+        last = self.pair.path_of_contact + float(mesh.lag.max())
+        position = np.linspace(0.0, last, n_positions)
+        return (
+            component_mesh_stiffness(*at, self.phases(), self.mesh_force),
+            component_pair_stiffness(*at, position, self.mesh_force),
+        )
+
     def faulty_pair(self, faults: Sequence[Fault], position: Array) -> Array:
         """Stiffness of the pair of the first faulty teeth at given positions, (phase,) N/m.
 
@@ -223,4 +254,5 @@ def _mesh_table(system: SlicedPair, faults: tuple[Fault, ...]) -> SlicedTable:
         faulty_teeth(system.pair, faults),
         force=system.mesh_force,
         deviation=system.deviation(),
+        hot_teeth=system.hot_teeth,
     )

@@ -10,7 +10,11 @@ from gensig.options.configuration import Configuration
 from gensig.systems.hot_pair import (
     APPARENT,
     COLD,
+    COLD_SUMS,
     CONTACT_RATIO,
+    PAPER,
+    PAPER_HOUSED,
+    PAPER_SUMS,
     SOFTENED,
     TRUE,
     Duty,
@@ -29,7 +33,13 @@ NAMES = {
     CONTACT_RATIO: "with contact-ratio change",
     APPARENT: "apparent",
     SOFTENED: "with E(T)",
+    PAPER: "the paper's equations",
+    PAPER_HOUSED: "... with contact-ratio",
+    COLD_SUMS: "cold, eq. (14)",
+    PAPER_SUMS: "the paper's, eq. (14)",
 }
+# what a variant is compared with, if not the cold pair
+COMPARED = {PAPER_SUMS: COLD_SUMS}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -104,17 +114,17 @@ def print_heat(report: HeatReport) -> None:
         show(f"{name + ', bore to teeth':<27}{temperatures} degrees Celsius")
     flash = state.flash.max()
     show(f"flash temperature          up to {flash:.1f} K above the teeth's")
-    cold = variants[COLD]
     show(f"{'':<27}{'contact ratio':>13}{'mesh, mean':>18}{'single, highest':>28}")
     for key, name in NAMES.items():
         if key in variants:
+            cold = variants[COMPARED.get(key, COLD)]
             show(f"{name:<27}{_variant_line(variants[key], cold)}")
     growth = f"{state.growth.teeth_alone(report.duty.system.pair) * 1e6:.1f} um"
     if APPARENT in variants:
         text = f"force over the approach less {growth} of tooth growth; no stiffness"
         show(f"{'':<27}apparent: {text}")
     elif report.duty.heat.growth:
-        approach = cold.approach.mean() * 1e6
+        approach = variants[COLD].approach.mean() * 1e6
         text = f"teeth grow {growth}, more than the approach of {approach:.1f} um"
         show(f"{NAMES[APPARENT]:<27}none: {text}")
 

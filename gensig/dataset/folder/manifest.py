@@ -42,6 +42,7 @@ SINCE_0_9 = {
     "plan.fault_gear": "as_given",
     "plan.n_reference": 0,
     "quality.run_in_share": 0,
+    "mesh.heat_law": "grown",
 }
 RECEIPT_SUFFIX = ".done"
 

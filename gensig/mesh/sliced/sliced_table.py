@@ -38,6 +38,7 @@ from gensig.mesh.sliced.slices import (
     sliced_mesh,
 )
 from gensig.mesh.smooth_table import smooth
+from gensig.mesh.thermal.paper_growth import PaperGrowth
 
 Array = NDArray[np.float64]
 
@@ -119,6 +120,7 @@ class _Setting:
     options: MeshOptions
     slices: SliceOptions
     deviation: _Keyed
+    hot_teeth: PaperGrowth | None
     force: float
     pinion: _Keyed
     wheel: _Keyed
@@ -145,6 +147,7 @@ def sliced_table(
     *,
     force: float,
     deviation: Array | None = None,
+    hot_teeth: PaperGrowth | None = None,
 ) -> SlicedTable:
     """Tabulate the mesh of a pair cut into slices.
 
@@ -152,7 +155,7 @@ def sliced_table(
     ----------
     teeth : the faulty teeth by (gear, tooth), from ``faulty_teeth``
     force : N    along the transverse line of action; depths reach three times its largest depth
-    deviation : (slice, node) m    see ``sliced_mesh``
+    deviation : (slice, node) m    see ``sliced_mesh``, as for ``hot_teeth``
 
     Raises
     ------
@@ -174,6 +177,7 @@ def sliced_table(
         options=options,
         slices=slices,
         deviation=_Keyed(key=_digest(deviation), value=deviation),
+        hot_teeth=hot_teeth,
         force=force,
         pinion=_keyed(pinion[np.bincount(pinion_kind).argmax()]),
         wheel=_keyed(wheel[np.bincount(wheel_kind).argmax()]),
@@ -295,6 +299,7 @@ def _mesh(setting: _Setting, pinion: _Keyed, wheel: _Keyed) -> SlicedMesh:
         setting.slices,
         deviation=setting.deviation.value,
         teeth=teeth,
+        hot_teeth=setting.hot_teeth,
     )
 
 

@@ -34,6 +34,8 @@ from gensig.mesh.sliced.slice_teeth import (
     merged_edges,
     slices_of_gears,
 )
+from gensig.mesh.thermal.paper_growth import PaperGrowth
+from gensig.mesh.thermal.paper_teeth import paper_terms
 
 Array = NDArray[np.float64]
 
@@ -130,6 +132,7 @@ def sliced_mesh(
     *,
     deviation: Array | None = None,
     teeth: Mapping[tuple[str, int], Tooth] | None = None,
+    hot_teeth: PaperGrowth | None = None,
 ) -> SlicedMesh:
     """Cut a pair into `n_slices` of equal width, and at the ends of faults.
 
@@ -138,6 +141,8 @@ def sliced_mesh(
     deviation : (slice, node) m    of both flanks of all teeth together from perfect flanks, at
         the table's positions, in the middle of slices of equal width (`slice_middles`)
     teeth : the faulty teeth by (gear, tooth), from ``faulty_teeth``
+    hot_teeth : growth of all teeth by ``mesh.heat_law=paper``; what faults add is that of cold
+        teeth
 
     Raises
     ------
@@ -148,7 +153,7 @@ def sliced_mesh(
     edges = merged_edges(pair, slices.n_slices, teeth.values())
     middles = 0.5 * (edges[1:] + edges[:-1])
     position = node_positions(pair, options)
-    structure, shared = _structure(pair, material, options)
+    structure, shared = _structure(pair, material, options, hot_teeth)
     on_path = np.clip(position, 0.0, pair.path_of_contact)
     law = contact_law(pair, on_path, material, options)
     gap = np.zeros((len(middles), len(position)))
@@ -194,7 +199,10 @@ def slice_middles(pair: GearPair, slices: SliceOptions) -> Array:
 
 @lru_cache(maxsize=16)
 def _structure(
-    pair: GearPair, material: Material, options: MeshOptions
+    pair: GearPair,
+    material: Material,
+    options: MeshOptions,
+    hot_teeth: PaperGrowth | None,
 ) -> tuple[Array, float]:
     """Unshared compliance of sound teeth and bodies per width (node,) m2/N, and shared, m/N."""
     clipped = np.clip(node_positions(pair, options), 0.0, pair.path_of_contact)
@@ -202,8 +210,12 @@ def _structure(
     in_plane = material.in_plane(options.elasticity)
     whole = np.zeros_like(on_path)
     for side, gear in pair.gears.items():
-        tooth, curvature = healthy_tooth(gear), pair.curvature(side, on_path)
-        compliance = structural_compliance(tooth, curvature, in_plane, options)
+        if hot_teeth is not None:
+            hot = pair, side, on_path, in_plane, options, hot_teeth
+            compliance = np.sum(list(paper_terms(*hot).values()), axis=0)
+        else:
+            tooth, curvature = healthy_tooth(gear), pair.curvature(side, on_path)
+            compliance = structural_compliance(tooth, curvature, in_plane, options)
         whole += compliance * gear.face_width
     shared = coupling_compliance(pair, in_plane, options)
     left = whole - shared * pair.face_width

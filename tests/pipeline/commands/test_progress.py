@@ -267,5 +267,7 @@ def test_quiet_shows_no_note_and_no_result(tmp_path, capsys):
     assert (printed.out, printed.err) == ("", "")
     assert main(["resume", out]) == 0
     assert "is complete" in capsys.readouterr().out
-    assert main(["resume", f"{out}/none", "--quiet"]) == 2  # a mistake is said all the same
+    assert (
+        main(["resume", f"{out}/none", "--quiet"]) == 2
+    )  # a mistake is said all the same
     assert capsys.readouterr().err.startswith("gensig: ")
