@@ -27,7 +27,12 @@ from gensig.mesh.thermal.heat import (
     friction_heat,
     rolling_speeds,
 )
-from gensig.mesh.thermal.paper_growth import READINGS, PaperGrowth, gear_growth
+from gensig.mesh.thermal.paper_growth import (
+    READINGS,
+    PaperGrowth,
+    gear_growth,
+    no_growth,
+)
 from gensig.mesh.thermal.thermal_growth import GearGrowth, PairGrowth
 from gensig.systems.sliced_pair import SlicedPair
 
@@ -36,7 +41,14 @@ Array = NDArray[np.float64]
 COLD, TRUE, CONTACT_RATIO = "cold", "true", "contact_ratio"
 APPARENT, SOFTENED = "apparent", "softened"
 PAPER, PAPER_HOUSED = "paper", "paper_contact_ratio"
-COLD_SUMS, PAPER_SUMS = "cold_components", "paper_components"
+PAPER_COLD = "paper_cold"
+PAPER_SUMS, PAPER_COLD_SUMS = "paper_components", "paper_cold_components"
+# the variant that a variant of the paper's equations is compared with
+COMPARED = {
+    PAPER: PAPER_COLD,
+    PAPER_HOUSED: PAPER_COLD,
+    PAPER_SUMS: PAPER_COLD_SUMS,
+}
 N_FLASH_POSITIONS = 60
 
 
@@ -237,7 +249,8 @@ def stiffness_variants(duty: Duty, state: HotState) -> dict[str, Variant]:
     softened : as ``true``, with Young's modulus at temperature
     paper : by the reading of the paper's equations that ``mesh.heat_law`` names
     paper_contact_ratio : as ``paper``, the housing has its own temperature
-    cold_components, paper_components : cold, and as ``paper``, by the literal eq. (14)
+    paper_cold : by the same equations without growth; equal to ``cold``, but for misprints
+    paper_components, paper_cold_components : as both, by the literal eq. (14)
     """
 
     def variant(*, center_distance: bool = False, softening: bool = False) -> Variant:
@@ -271,19 +284,31 @@ def _paper_variants(duty: Duty, state: HotState) -> dict[str, Variant]:
     """The variants of the paper's equations."""
     effects = {"growth": True, "softening": False, "papers": True}
     hot = heated(duty, state, center_distance=False, **effects)
-    variants = {PAPER: _variant(hot)}
+    at_rest = replace(duty.system, hot_teeth=no_growth(duty.system.mesh.heat_law))
+    variants = {PAPER_COLD: _variant(at_rest), PAPER: _variant(hot)}
     if duty.heat.center_distance:
         housed = heated(duty, state, center_distance=True, **effects)
         variants[PAPER_HOUSED] = _variant(housed)
-    for name, system in ((COLD_SUMS, duty.system), (PAPER_SUMS, hot)):
+    for name, of_slices, system in (
+        (PAPER_COLD_SUMS, PAPER_COLD, at_rest),
+        (PAPER_SUMS, PAPER, hot),
+    ):
         mesh, single = system.component_sums()
         variants[name] = replace(
-            _variant(system),
+            variants[of_slices],
             approach=system.mesh_force / mesh,
             mesh=mesh,
             single=single,
         )
     return variants
+
+
+def compared(variants: dict[str, Variant], name: str) -> Variant:
+    """The cold variant to compare another with: by the same equations, where those are the paper's.
+
+    The paper's equations without growth are compared with the cold pair.
+    """
+    return variants[COMPARED.get(name, COLD)]
 
 
 def sweep(duty: Duty, name: str, values: Sequence[float]) -> list[dict[str, Variant]]:

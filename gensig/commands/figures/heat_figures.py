@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,21 @@ from gensig.commands.figures.style import (
     titles,
 )
 from gensig.commands.gears.heat_report import NAMES, HeatReport
-from gensig.systems.hot_pair import APPARENT, COLD
+from gensig.systems.hot_pair import (
+    APPARENT,
+    COLD,
+    PAPER,
+    PAPER_COLD,
+    PAPER_COLD_SUMS,
+    PAPER_HOUSED,
+    PAPER_SUMS,
+)
 
 ABOVE = 1.25  # highest apparent stiffness that is drawn, over the largest of the others
+
+STYLES = {COLD: "--", PAPER_COLD: ":", PAPER: "-.", PAPER_HOUSED: "-."}
+# sums of components lie beside the others by more than heat changes
+NOT_DRAWN = (PAPER_SUMS, PAPER_COLD_SUMS)
 
 
 def plot_heat(report: HeatReport, path: Path) -> None:
@@ -31,16 +44,21 @@ def plot_heat(report: HeatReport, path: Path) -> None:
     _bulk(bulk, report)
     _flash(flash, report)
     title = "Mesh"
-    drawn = dict(report.variants)
+    drawn = {
+        name: variant
+        for name, variant in report.variants.items()
+        if name not in NOT_DRAWN
+    }
     apparent = drawn.pop(APPARENT, None)
     if apparent is not None:
         top = ABOVE * max(float(variant.mesh.max()) for variant in drawn.values())
         if apparent.mesh.max() < top:
-            drawn = report.variants
+            drawn[APPARENT] = apparent
         else:
             title += f" (apparent, mean {apparent.mesh.mean() / 1e9:.3g}: beyond)"
-    for color, (name, variant) in zip((GREY, *COLORS), drawn.items(), strict=False):
-        style = {COLD: "--"}.get(name, "-")
+    colors = itertools.cycle((GREY, *COLORS))
+    for color, (name, variant) in zip(colors, drawn.items(), strict=False):
+        style = STYLES.get(name, "-")
         single = variant.single / 1e9
         curve(pair, variant.position, single, color, NAMES[name], style=style)
         n_phases = len(variant.mesh)

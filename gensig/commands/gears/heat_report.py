@@ -10,9 +10,10 @@ from gensig.options.configuration import Configuration
 from gensig.systems.hot_pair import (
     APPARENT,
     COLD,
-    COLD_SUMS,
     CONTACT_RATIO,
     PAPER,
+    PAPER_COLD,
+    PAPER_COLD_SUMS,
     PAPER_HOUSED,
     PAPER_SUMS,
     SOFTENED,
@@ -20,6 +21,7 @@ from gensig.systems.hot_pair import (
     Duty,
     HotState,
     Variant,
+    compared,
     flash_skin_growth,
     hot_state,
     stiffness_variants,
@@ -33,13 +35,12 @@ NAMES = {
     CONTACT_RATIO: "with contact-ratio change",
     APPARENT: "apparent",
     SOFTENED: "with E(T)",
-    PAPER: "the paper's equations",
-    PAPER_HOUSED: "... with contact-ratio",
-    COLD_SUMS: "cold, eq. (14)",
-    PAPER_SUMS: "the paper's, eq. (14)",
+    PAPER_COLD: "the paper's, cold",
+    PAPER: "the paper's, hot",
+    PAPER_HOUSED: "and contact-ratio change",
+    PAPER_COLD_SUMS: "eq. (14), cold",
+    PAPER_SUMS: "eq. (14), hot",
 }
-# what a variant is compared with, if not the cold pair
-COMPARED = {PAPER_SUMS: COLD_SUMS}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -117,8 +118,8 @@ def print_heat(report: HeatReport) -> None:
     show(f"{'':<27}{'contact ratio':>13}{'mesh, mean':>18}{'single, highest':>28}")
     for key, name in NAMES.items():
         if key in variants:
-            cold = variants[COMPARED.get(key, COLD)]
-            show(f"{name:<27}{_variant_line(variants[key], cold)}")
+            line = _variant_line(variants[key], compared(variants, key))
+            show(f"{name:<27}{line}")
     growth = f"{state.growth.teeth_alone(report.duty.system.pair) * 1e6:.1f} um"
     if APPARENT in variants:
         text = f"force over the approach less {growth} of tooth growth; no stiffness"

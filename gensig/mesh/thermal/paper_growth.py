@@ -100,6 +100,17 @@ class PaperGrowth:
         return {"pinion": self.pinion, "wheel": self.wheel}[side]
 
 
+_AT_REST = PaperGearGrowth(base=0.0, root=0.0, tooth=0.0)
+
+
+def no_growth(reading: str) -> PaperGrowth:
+    """Cold teeth by a reading of the equations."""
+    sides = {"pinion": _AT_REST, "wheel": _AT_REST}
+    return PaperGrowth(
+        reading=reading, **sides, flash_position=(0.0,), flash_strain=(0.0,)
+    )
+
+
 def gear_growth(
     gear: Gear,
     reading: Reading,
@@ -238,7 +249,6 @@ def hot_load_angle(
     gear: Gear,
     growth: PaperGearGrowth,
     reading: Reading,
-    strain: Array,
     curvature_radius: Array,
     entry: tuple[float, float],
 ) -> Array:
@@ -246,21 +256,16 @@ def hot_load_angle(
 
     Parameters
     ----------
-    strain : (phase,)
     curvature_radius : (phase,) m    of the cold flank
     entry : m and strain             curvature radius where the tooth enters, and its strain
 
     Source: thermal paper eqs. (20) and (23): the angle of the hot profile's normal where the tooth
     enters contact, and the gear's rotation from there.
     """
-    del strain  # the profile of the entering tooth sets the angle
     start = np.array([entry[0]])
     turned = _normal_angle(gear, growth, reading, entry[1], start)
     cold = _normal_angle(gear, _AT_REST, reading, 0.0, start)
     return load_angle(gear, curvature_radius) + float((turned - cold)[0])
-
-
-_AT_REST = PaperGearGrowth(base=0.0, root=0.0, tooth=0.0)
 
 
 def _normal_angle(

@@ -58,7 +58,7 @@ def paper_terms(
         float(growth.strain(side, enters)[0]),
     )
     strain = growth.strain(side, position)
-    angle = hot_load_angle(gear, own, growth.rules, strain, curvature, entry)
+    angle = hot_load_angle(gear, own, growth.rules, curvature, entry)
     parts = []
     for begin in range(0, len(position), PHASES_AT_ONCE):
         some = slice(begin, begin + PHASES_AT_ONCE)

@@ -69,7 +69,12 @@ SOURCE_TEXTS = {
         "profile shift and the rack's rounding are assumed, the paper prints none of them. "
         "Hot gears are those of heat=chongqing_rated, whose inputs are assumed as well; "
         "`true`, `contact_ratio`, `apparent` and `softened` are the effects of heat one by "
-        "one (docs/theory/heat.md), `ours` gensig's own mesh."
+        "one (docs/theory/heat.md), `ours` gensig's own mesh. Lines `paper` have the paper's own "
+        "equations (10) to (29), `mesh.heat_law=paper`, compared with the same equations without "
+        "heat; `paper_components` adds components up as eq. (14) has it; the others are readings "
+        "of what is misprinted or open (docs/theory/heat.md). `uniform_100_k` is the change by "
+        "100 K of both gears. Two lines meet the printed hot mean by their level alone: their "
+        "cold means are 12 % and 5 % above the printed one."
     ),
     "engine_root_stress": (
         "Sun, Shi, Chen, Li & Liu, spur gears 54/54 of module 3, and numbers computed from it "

@@ -79,8 +79,8 @@ PAGES = {
     ),
     "helical_heat": Page(
         title="Stiffness of helical gears with temperature",
-        answer="cold stiffness comes out; the rise of 11 % with heat does not: it counts the "
-        "growth of angles twice.",
+        answer="cold stiffness comes out; the rise of 11 % with heat does not, by gensig's law or "
+        "by the paper's own equations, in any reading.",
         claims="The paper adds thermal growth to the profile of the pair 40/162 and finds mesh "
         "stiffness 11 % higher hot than cold, and rising with friction, torque and speed.",
         sources=("helical_heat_paper",),
@@ -91,6 +91,13 @@ PAGES = {
             "hot.mesh_mean",
             "hot_change.mesh_mean",
             "hot_change.ours",
+            "paper",
+            "paper_components",
+            "paper_misprints",
+            "paper_contact",
+            "paper_twice",
+            "paper_once",
+            "paper_contact_ratio",
             "sweeps.friction",
             "sweeps.torque",
             "sweeps.speed",

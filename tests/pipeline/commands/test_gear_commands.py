@@ -200,6 +200,29 @@ def test_stiffness_separates_the_effects_of_heat(written, drawn, capsys):
     assert_allclose(flash.get_ydata(), heat["flash_temperature_k"])
 
 
+def test_the_papers_hot_teeth_stand_beside_gensigs(written, drawn, capsys):
+    content = written(f"stiffness {HOT} mesh.heat_law=paper --plot s.png")
+    text, variants = capsys.readouterr().out, content["heat"]["variants"]
+    assert list(variants)[:5] == [
+        "cold",
+        "true",
+        "contact_ratio",
+        "apparent",
+        "softened",
+    ]
+    key = "mesh_stiffness_mean_n_per_m"
+    mean = {name: variant[key] for name, variant in variants.items()}
+    assert mean["paper_cold"] == pytest.approx(mean["cold"], rel=1e-12)
+    assert 1e-5 < 1.0 - mean["paper"] / mean["paper_cold"] < 1e-3
+    sums = mean["paper_components"], mean["paper_cold_components"]
+    assert 1e-5 < 1.0 - sums[0] / sums[1] < 1e-3
+    assert sums[1] > mean["cold"]
+    assert all(name in text for name in ("the paper's, hot", "eq. (14), hot"))
+    curves = labels(drawn[0]["One pair, slices on the path"])
+    assert "the paper's, hot" in curves
+    assert "eq. (14), hot" not in curves
+
+
 def test_effects_of_heat_are_switched_one_by_one(written, capsys):
     switched = "heat.growth=false heat.center_distance=false"
     content = written(f"stiffness {HOT} {switched}")

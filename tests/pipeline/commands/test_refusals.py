@@ -176,6 +176,15 @@ REFUSED = {
         "slices_in_phase = true is for comparing"
     ),
     "gensig stiffness heat=chongqing_rated mesh.law=paper": "heat.growth opens gaps",
+    f"gensig stiffness {HOT} heat=none mesh.heat_law=paper": "take heat=chongqing_rated or",
+    f"gensig simulate {HOT} heat.growth=false mesh.heat_law=paper": "heat.growth=true",
+    f"gensig stiffness {HOT} mesh.heat_law=hot": "allowed: grown, paper, paper_misprints",
+    f"gensig stiffness {HOT} mesh.heat_law=paper mesh.body=ring": "take mesh.body=null or",
+    f"gensig stiffness {HOT} mesh.heat_law=paper mesh.tooth=to_centreline": "mesh.tooth=null",
+    "gensig plan heat=chongqing_rated mesh.heat_law=paper": "not for system=spur_pair",
+    "gensig simulate system=two_stage_gearbox heat=chongqing_rated mesh.heat_law=paper": (
+        "not for a drive line"
+    ),
     "gensig simulate heat=chongqing_rated mesh.law=paper": "heat.growth opens gaps",
     f"gensig stiffness {HOT} heat.pinion_temperature_degc=400": "data, -75 to 300 degrees",
     f"gensig stiffness {HOT} mesh.friction_coefficient=0.5": "data, -75 to 300 degrees",

@@ -12,9 +12,11 @@ from refusals import refused
 from gensig.errors import ConfigError, ExtrapolationError, GeometryError
 from gensig.mesh.modification import FlankModification
 from gensig.mesh.thermal.body_heat import heat_capacity, time_constant
+from gensig.mesh.thermal.paper_growth import READINGS
 from gensig.options.compose import compose
 from gensig.systems.hot_pair import (
     as_configured,
+    compared,
     flash_skin_growth,
     heated,
     hot_state,
@@ -81,6 +83,55 @@ def test_without_heat_it_is_the_cold_pair():
             duty.system.single_pair(401)[1],
             1e-12,
         )
+
+
+def test_papers_hot_teeth_without_a_rise_are_cold():
+    """Bulk at the reference temperature and no friction; a rise changes them, by each law."""
+    words = "mesh.heat_law=paper", *at(20, housing=20), f"{FRICTION}=0"
+    duty, variants = variants_of(*words)
+    for name, other in (
+        ("paper", "cold"),
+        ("paper_cold", "cold"),
+        ("paper_components", "paper_cold_components"),
+    ):
+        assert_close(variants[name].mesh, variants[other].mesh, 1e-12)
+        assert_close(variants[name].single, variants[other].single, 1e-12)
+    rubs = variants_of(*words[:-1])[1]
+    assert np.abs(rubs["paper"].mesh / rubs["cold"].mesh - 1.0).max() > 1e-4
+    assert_close(as_configured(duty).single_pair()[1], variants["cold"].single, 1e-12)
+
+
+@pytest.mark.parametrize("law", ["one_sided", "paper"])
+def test_records_have_the_papers_hot_teeth(law):
+    """The table that the dynamics read is stiff as the pair is, and unlike that of gensig's law."""
+    words = f"mesh.law={law}", *at(70), "heat.softening=false", "gear.backlash_um=900"
+    hot, grown, cold = (
+        read_system(config_of(*words, f"mesh.heat_law={name}", heat=heat))
+        for name, heat in (
+            ("paper_contact", "chongqing_rated"),
+            ("grown", "chongqing_rated"),
+            ("grown", "none"),
+        )
+    )
+    assert hot.flanks.hot_teeth is not None
+    assert grown.flanks.hot_teeth is None
+    tables = [machine.mesh_table().compliance for machine in (hot, grown, cold)]
+    assert np.abs(tables[0] / tables[1] - 1.0).max() > 1e-4
+    plain = replace(hot.flanks, hot_teeth=None).mesh_table().compliance
+    assert np.abs(tables[0] / plain - 1.0).max() > 1e-4
+
+
+def test_no_reading_of_the_paper_reaches_its_eleven_per_cent():
+    """Nor do angles that count twice; hot tips at held shafts reach half of it, in the mean."""
+    held = *at(90, 70, 20), "gear.backlash_um=4000"
+    for name in READINGS:
+        _, variants = variants_of(f"mesh.heat_law={name}", *held)
+        for variant in ("paper", "paper_components"):
+            cold = compared(variants, variant)
+            assert abs(variants[variant].mesh.mean() / cold.mesh.mean() - 1.0) < 0.004
+        housed, cold = variants["paper_contact_ratio"], variants["paper_cold"]
+        assert 0.03 < housed.mesh.mean() / cold.mesh.mean() - 1.0 < 0.07
+        assert housed.single.max() / cold.single.max() - 1.0 < 0.03
 
 
 def test_gears_and_housing_equally_hot_are_as_stiff_per_width():

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 
 from gensig.mesh.thermal.body_heat import BodyHeat, face_surface, tooth_surface
 from gensig.mesh.thermal.heat import flash_temperature
+from gensig.mesh.thermal.paper_growth import READINGS, gear_growth, no_growth
 from gensig.options.compose import compose
 from gensig.systems.hot_pair import (
     COLD,
@@ -17,6 +18,7 @@ from gensig.systems.hot_pair import (
     Duty,
     HotState,
     Variant,
+    compared,
     hot_state,
     stiffness_variants,
     sweep,
@@ -66,11 +68,38 @@ def _single(case: HotCase, at: str) -> float:
 
 
 def _mesh_change(case: HotCase, at: str) -> float:
-    return _mesh(case, at) / _mesh(case, COLD) - 1.0
+    cold = compared(case.variants, at)
+    return _mesh(case, at) / float(cold.mesh.mean()) - 1.0
 
 
 def _single_change(case: HotCase, at: str) -> float:
-    return _single(case, at) / _single(case, COLD) - 1.0
+    cold = compared(case.variants, at)
+    return _single(case, at) / float(cold.single.max()) - 1.0
+
+
+def _uniform_change(case: HotCase, at: str) -> float:
+    """Change of the mean stiffness by the paper's equations where both gears are ``at`` K hotter.
+
+    There is no flash.
+    """
+    system, rise = case.duty.system, float(at)
+    name = system.mesh.heat_law
+    sides = {
+        side: gear_growth(
+            gear,
+            READINGS[name],
+            bore_rise=rise,
+            tooth_rise=rise,
+            expansion=case.duty.heat.expansion,
+            poisson_ratio=system.material.poisson_ratio,
+        )
+        for side, gear in system.pair.gears.items()
+    }
+    hot, cold = (
+        replace(system, hot_teeth=growth).transmission_error().contact.stiffness.mean()
+        for growth in (replace(no_growth(name), **sides), no_growth(name))
+    )
+    return float(hot / cold) - 1.0
 
 
 def _contact_ratio_change(case: HotCase, at: str) -> float:
@@ -183,6 +212,7 @@ HOT: dict[str, HotCheck] = {
     "heat.single_pair_stiffness": _single,
     "heat.mesh_change": _mesh_change,
     "heat.single_change": _single_change,
+    "heat.uniform_change": _uniform_change,
     "heat.contact_ratio_change": _contact_ratio_change,
     "heat.teeth_per_kelvin": _teeth_per_kelvin,
     "heat.rise_for_printed": _rise_for_printed,

@@ -1,0 +1,231 @@
+"""Hot teeth by the thermal paper's equations: each equation by a number, and its laws."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from closeness import assert_close
+from refusals import refused
+
+from gensig.errors import ConfigError
+from gensig.geometry.tooth import healthy_tooth
+from gensig.geometry.tooth_profile import load_angle
+from gensig.mesh.options import CHOICES
+from gensig.mesh.pair_table import structural_terms
+from gensig.mesh.thermal.paper_growth import (
+    READINGS,
+    PaperGrowth,
+    Reading,
+    base_half_angle,
+    gear_growth,
+    hot_load_angle,
+    hot_outline,
+    no_growth,
+    shift_angle,
+)
+from gensig.mesh.thermal.paper_teeth import TERMS, paper_terms
+from gensig.options.compose import compose
+from gensig.systems.registry import read_cold_pair
+
+EXPANSION, NU = 12e-6, 0.3
+RIGHT = Reading(has_printed_body=False)
+SIDES = ("pinion", "wheel")
+
+
+@pytest.fixture(scope="module")
+def flanks():
+    """The paper's pair by its conventions."""
+    return read_cold_pair(
+        compose(
+            "generate",
+            [
+                "system=helical_pair",
+                "gear=chongqing_40_162",
+                "mesh.law=paper",
+                "mesh.contact=linear",
+                "mesh.allow_extrapolation=true",
+            ],
+        )
+    )
+
+
+def grown(gear, reading=RIGHT, bore_rise=100.0, tooth_rise=100.0):
+    return gear_growth(
+        gear,
+        reading,
+        bore_rise=bore_rise,
+        tooth_rise=tooth_rise,
+        expansion=EXPANSION,
+        poisson_ratio=NU,
+    )
+
+
+def growth_of(flanks, name, *, rise=0.0, flash=0.0):
+    pair = flanks.pair
+    gears = {
+        side: grown(gear, READINGS[name], rise, rise)
+        for side, gear in pair.gears.items()
+    }
+    return PaperGrowth(
+        reading=name,
+        **gears,
+        flash_position=(0.0, pair.path_of_contact),
+        flash_strain=(EXPANSION * flash, EXPANSION * flash),
+    )
+
+
+def terms_of(flanks, growth, side="pinion"):
+    position = np.linspace(0.0, flanks.pair.path_of_contact, 300)
+    plane = flanks.material.in_plane(flanks.mesh.elasticity)
+    return paper_terms(flanks.pair, side, position, plane, flanks.mesh, growth)
+
+
+def total(flanks, growth):
+    return sum(
+        flanks.pair.gears[side].face_width
+        * sum(terms_of(flanks, growth, side).values())
+        for side in SIDES
+    )
+
+
+def test_every_reading_is_a_choice_of_the_option():
+    assert CHOICES["heat_law"] == ("grown", *READINGS)
+    with refused("mesh.heat_law = 'hot'; readings: paper", ConfigError):
+        no_growth("hot")
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_an_even_rise_grows_both_circles_by_their_radius(flanks, side):
+    """Eqs. (6) and (9) as printed; eq. (8) only with Poisson's ratios put right."""
+    gear = flanks.pair.gears[side]
+    assert (
+        gear.root_radius > gear.base_radius
+    )  # so (9) is the root's, and (8) the base's
+    even = EXPANSION * 100.0
+    right, printed = grown(gear), grown(gear, READINGS["paper"])
+    assert_close(right.base, even * gear.base_radius, 1e-12)
+    assert_close([right.root, printed.root], even * gear.root_radius, 1e-12)
+    assert abs(printed.base / right.base - 1.0) > 0.05
+
+
+@pytest.mark.parametrize("bore_rise", [0.0, 30.0, 150.0])
+def test_displacements_solve_the_disc(flanks, bore_rise):
+    """Eq. (5) by quadrature with the temperature of eq. (4), at both circles."""
+    gear, rise = flanks.pair.pinion, 100.0
+    bore, outer = gear.bore_radius, gear.root_radius
+
+    def moment(upper):
+        r = np.linspace(bore, upper, 20001)
+        heat = bore_rise + (rise - bore_rise) * np.log(r / bore) / np.log(outer / bore)
+        return np.trapezoid(heat * r, r)
+
+    def expected(r):
+        ring = outer**2 - bore**2
+        own = (1.0 + NU) / r * moment(r)
+        solid = (r * (1.0 - NU) + bore**2 * (1.0 + NU) / r) / ring * moment(outer)
+        return EXPANSION * (own + solid)
+
+    moved = grown(gear, bore_rise=bore_rise)
+    assert_close(moved.base, expected(gear.base_radius), 1e-7)
+    assert_close(moved.root, expected(outer), 1e-7)
+
+
+def test_points_of_the_profile_by_hand(flanks):
+    """Eqs. (10) to (12) and (15) with round numbers: u_b = 0.1 mm, lambda dT = 0.001."""
+    gear = flanks.pair.pinion
+    growth = replace(grown(gear), base=1e-4)
+    base, radius, half = gear.base_radius, 0.25, 0.03
+    strain = np.array([[1e-3]])
+    at = gear, growth, READINGS["paper"], strain, np.array([radius]), np.array([half])
+    moved, angle = hot_outline(*at)
+    by_hand = radius + 1e-4 + 1e-3 * (radius - base)
+    wider = 1e-3 * 2.0 * radius * half / (2.0 * by_hand)
+    at_base = 1e-3 * base * gear.half_tooth_angle_base / (base + 1e-4)
+    assert_close(moved, by_hand, 1e-14)
+    assert_close(angle, half + wider - at_base, 1e-14)
+    assert at_base > wider  # by theta'(0) in alpha_2 the tooth is thinner, not thicker
+    twice = hot_outline(gear, growth, READINGS["paper_twice"], *at[3:])[1]
+    assert_close(twice, half + wider, 1e-14)
+    once = hot_outline(gear, growth, READINGS["paper_once"], *at[3:])[1]
+    assert_close(once, half, 1e-14)
+
+
+def test_the_misprinted_base_angle_lacks_the_profile_shift(flanks):
+    gear = flanks.pair.pinion
+    printed = math.pi / (2.0 * gear.n_teeth)
+    alpha = gear.transverse_pressure_angle
+    printed += math.tan(alpha) - alpha
+    assert_close(base_half_angle(gear, READINGS["paper_misprints"]), printed, 1e-12)
+    assert_close(base_half_angle(gear, RIGHT) - printed, shift_angle(gear), 1e-12)
+
+
+@pytest.mark.parametrize("name", READINGS)
+def test_load_angles_turn_with_the_normal_where_the_tooth_enters(flanks, name):
+    """Eq. (20), its slope by finite differences of the hot profile."""
+    gear, rules = flanks.pair.pinion, READINGS[name]
+    growth, strain = grown(gear, rules), 2e-3
+    start = 0.5 * gear.base_radius * math.tan(gear.transverse_pressure_angle)
+    near = start + np.array([-1e-6, 1e-6])
+    base = gear.base_radius
+
+    def normal(growth, strain):
+        roll = near / base
+        half = base_half_angle(gear, rules) - (roll - np.arctan(roll))
+        at = np.array([[strain]]), np.hypot(base, near), half
+        radius, angle = (values[0] for values in hot_outline(gear, growth, rules, *at))
+        x, z = radius * np.cos(angle), radius * np.sin(angle)
+        return math.atan2(z[0] - z[1], x[1] - x[0])
+
+    at_rest = no_growth(name).pinion
+    turned = normal(growth, strain) - normal(at_rest, 0.0)
+    curvature = np.linspace(start, 1.5 * start, 5)
+    found = hot_load_angle(gear, growth, rules, curvature, (start, strain))
+    assert_close(found - load_angle(gear, curvature), turned, atol=1e-8)
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_without_growth_every_term_is_that_of_cold_teeth(flanks, side):
+    """Eqs. (24) to (29) put right are gensig's own, term by term; as printed they are not."""
+    pair = flanks.pair
+    position = np.linspace(0.0, pair.path_of_contact, 300)
+    plane = flanks.material.in_plane(flanks.mesh.elasticity)
+    cold = structural_terms(
+        healthy_tooth(pair.gears[side]),
+        pair.curvature(side, position),
+        plane,
+        flanks.mesh,
+    )
+    for name in READINGS:
+        hot = terms_of(flanks, no_growth(name), side)
+        for term in TERMS:
+            changed = np.max(np.abs(hot[term] / cold[term] - 1.0))
+            assert (changed > 0.005) == READINGS[name].has_misprints, (name, term)
+            assert changed < 1e-12 or READINGS[name].has_misprints, (name, term)
+
+
+def test_an_even_rise_leaves_stiffness_alone_only_if_angles_grow_once(flanks):
+    """A similar gear is as stiff per width: the equations as printed are not neutral."""
+    change = {
+        name: total(flanks, growth_of(flanks, name, rise=100.0))
+        / total(flanks, no_growth(name))
+        - 1.0
+        for name in READINGS
+    }
+    assert np.abs(change.pop("paper_once")).max() < 1e-12
+    for name, values in change.items():
+        assert np.abs(values).max() > 2e-4, name
+    # counted twice, angles make all of the path stiffer
+    assert change["paper_twice"].max() < 0.0
+    assert change["paper_contact"].min() > 0.0
+
+
+@pytest.mark.parametrize("name", READINGS)
+def test_more_flash_makes_teeth_softer_in_every_reading(flanks, name):
+    """Monotone, and in proportion for small strains."""
+    cold, warm, hot = (
+        total(flanks, growth_of(flanks, name, flash=flash)).mean()
+        for flash in (0.0, 20.0, 40.0)
+    )
+    assert cold < warm < hot
+    assert_close((hot - cold) / (warm - cold), 2.0, 0.01)
