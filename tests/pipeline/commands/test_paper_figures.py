@@ -66,6 +66,8 @@ def test_sweeps_of_hot_gears(written, number, row, rises):
     assert curves[panel, "printed"][1, 0] == float(value)
     by_paper = curves[panel, "the paper's conventions"][1]
     assert 0.0 < by_paper[-1] / by_paper[0] - 1.0 < 1e-3
+    by_equations = curves[panel, "the paper's conventions, hot by its equations"][1]
+    assert -1e-3 < by_equations[-1] / by_equations[0] - 1.0 < 0.0
     ours = curves[panel, "gensig's default"][1]
     assert (ours[-1] > ours[0]) == rises
 

@@ -7,6 +7,7 @@ import pytest
 
 from gensig.dataset.folder.manifest import SINCE_0_9, identity_hash, stored_config
 from gensig.dataset.plan import plan_text
+from gensig.mesh.options import read_mesh_options
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.options import PlanOptions, read_plan_options
@@ -53,6 +54,16 @@ def test_a_stored_configuration_without_the_key_has_the_default(config, key):
     assert read_plan_options(before) == read_plan_options(config)
     assert plan_text(make_plan(before)) == plan_text(make_plan(config))
     assert key not in stored_config(config.plain())["plan"]
+
+
+def test_gensigs_own_law_of_heat_is_no_part_of_the_identity_and_the_papers_is(config):
+    before = config.with_entries(mesh=config["mesh"].without("heat_law"))
+    assert before != config
+    assert identity(before) == identity(config)
+    assert "heat_law" not in stored_config(config.plain())["mesh"]
+    assert read_mesh_options(before["mesh"]) == read_mesh_options(config["mesh"])
+    papers = config.with_keys("mesh", heat_law="paper")
+    assert identity(papers) != identity(config)
 
 
 @pytest.mark.parametrize("key", DEFAULTS)
