@@ -109,11 +109,17 @@ def test_an_even_rise_grows_both_circles_by_their_radius(flanks, side):
     assert abs(printed.base / right.base - 1.0) > 0.05
 
 
+@pytest.mark.parametrize("n_teeth", [23, 40])
 @pytest.mark.parametrize("bore_rise", [0.0, 30.0, 150.0])
-def test_displacements_solve_the_disc(flanks, bore_rise):
-    """Eq. (5) by quadrature with the temperature of eq. (4), at both circles."""
-    gear, rise = flanks.pair.pinion, 100.0
-    bore, outer = gear.bore_radius, gear.root_radius
+def test_displacements_solve_the_disc(flanks, bore_rise, n_teeth):
+    """Eq. (5) by quadrature with the temperature of eq. (4), at both circles.
+
+    Of few teeth the base circle is the outer one.
+    """
+    gear = replace(flanks.pair.pinion, n_teeth=n_teeth, bore_radius=0.06)
+    rise, bore = 100.0, gear.bore_radius
+    outer = max(gear.base_radius, gear.root_radius)
+    assert (gear.base_radius > gear.root_radius) == (n_teeth == 23)
 
     def moment(upper):
         r = np.linspace(bore, upper, 20001)
@@ -128,7 +134,7 @@ def test_displacements_solve_the_disc(flanks, bore_rise):
 
     moved = grown(gear, bore_rise=bore_rise)
     assert_close(moved.base, expected(gear.base_radius), 1e-7)
-    assert_close(moved.root, expected(outer), 1e-7)
+    assert_close(moved.root, expected(gear.root_radius), 1e-7)
 
 
 def test_points_of_the_profile_by_hand(flanks):
