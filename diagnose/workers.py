@@ -60,6 +60,7 @@ def call_all(
                 results.append(function(*shared, item))
                 on_done(item, results[-1])
         return results
+    before = set(multiprocessing.active_children())
     context = multiprocessing.get_context("spawn")
     executor = ProcessPoolExecutor(
         min(n_workers, len(items)), context, _start, (function, shared)
@@ -69,6 +70,11 @@ def call_all(
         for future in as_completed(futures):
             on_done(futures[future], future.result())
         return [future.result() for future in futures]
+    except KeyboardInterrupt:
+        # SIGTERM reaches this process alone: no call is waited for.
+        for process in set(multiprocessing.active_children()) - before:
+            process.terminate()
+        raise
     except BrokenProcessPool:
         reason = f"a worker process was killed (out of memory?); {remedy}"
         raise GensigError(reason) from None

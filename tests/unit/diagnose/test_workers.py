@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -38,3 +39,37 @@ def page_faults(mode: str) -> int:
 def test_a_freed_large_array_is_used_again_without_new_pages() -> None:
     assert page_faults("keep") < 50
     assert page_faults("return") > 500
+
+
+SLEEPERS = """
+import sys, time
+from diagnose.workers import call_all
+from gensig.terminal.program import guarded
+
+def run():
+    print("begun", flush=True)
+    call_all(time.sleep, (), (600, 600), n_workers=2, on_done=print, remedy="")
+
+if __name__ == "__main__":
+    sys.exit(guarded("diagnose", run))
+"""
+
+
+def test_sigterm_waits_for_no_call(tmp_path) -> None:
+    """The signal reaches the parent alone, as from a batch system."""
+    script = tmp_path / "sleepers.py"
+    script.write_text(SLEEPERS)
+    process = subprocess.Popen(
+        [sys.executable, str(script)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "begun\n"
+    time.sleep(1.0)  # its workers are starting or asleep
+    process.terminate()
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == 143
+    (line,) = said.splitlines()
+    assert line.startswith("diagnose: stopped by SIGTERM; ")
