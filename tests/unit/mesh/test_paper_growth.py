@@ -10,7 +10,8 @@ from refusals import refused
 
 from gensig.errors import ConfigError
 from gensig.geometry.tooth import healthy_tooth
-from gensig.geometry.tooth_profile import load_angle
+from gensig.geometry.tooth_profile import load_angle, tooth_profile
+from gensig.mesh.fillet_foundation import body_coefficients
 from gensig.mesh.options import CHOICES
 from gensig.mesh.pair_table import structural_terms
 from gensig.mesh.thermal.paper_growth import (
@@ -208,6 +209,33 @@ def test_without_growth_every_term_is_that_of_cold_teeth(flanks, side):
             changed = np.max(np.abs(hot[term] / cold[term] - 1.0))
             assert (changed > 0.005) == READINGS[name].has_misprints, (name, term)
             assert changed < 1e-12 or READINGS[name].has_misprints, (name, term)
+
+
+def test_misprints_by_hand(flanks):
+    """Eq. (28) with z(0), and eq. (29) with u_r = x - R_f and alpha_3 of eq. (17), cold."""
+    pair = flanks.pair
+    gear, name = pair.pinion, "paper_misprints"
+    position = np.linspace(0.0, pair.path_of_contact, 300)
+    curvature = pair.curvature("pinion", position)
+    base, alpha_2 = gear.base_radius, base_half_angle(gear, READINGS[name])
+    roll = curvature / base
+    contact = np.hypot(base, curvature) * np.cos(alpha_2 - roll + np.arctan(roll))
+    profile = tooth_profile(gear)
+    root_radius = math.hypot(profile.abscissa[0], profile.half_thickness[0])
+    root_half = math.atan2(profile.half_thickness[0], profile.abscissa[0])
+    root = root_radius * math.cos(root_half - shift_angle(gear))
+    plane = flanks.material.in_plane(flanks.mesh.elasticity)
+    young = plane.youngs_modulus * gear.face_width
+    angle = load_angle(gear, curvature)
+    found = terms_of(flanks, no_growth(name))
+    axial = np.sin(angle) ** 2 * (contact - root) / (young * 2.0 * base)
+    assert_close(found["axial"], axial / math.sin(alpha_2), 1e-9)
+    values = body_coefficients(gear, allow_extrapolation=True)
+    alpha_3 = math.asin(base * math.sin(alpha_2) / gear.root_radius)
+    lever = (contact - gear.root_radius) / (2.0 * gear.root_radius * alpha_3)
+    bracket = values["L"] * lever**2 + values["M"] * lever
+    bracket += values["P"] * (1.0 + values["Q"] * np.tan(angle) ** 2)
+    assert_close(found["foundation"], np.cos(angle) ** 2 * bracket / young, 1e-12)
 
 
 def test_an_even_rise_leaves_stiffness_alone_only_if_angles_grow_once(flanks):
