@@ -15,6 +15,7 @@ from diagnose.data.windows import HEALTHY, FloatArray
 from diagnose.networks.network import SiteNetwork
 from diagnose.recordings.prepared import prepare_recording
 from diagnose.recordings.source import Source
+from diagnose.recordings.stored_network import require_finite
 from diagnose.report.tooth_figure import AccusedTooth
 from gensig.errors import ConfigError
 
@@ -60,6 +61,7 @@ def accused_of_turns(
     with torch.inference_mode():
         scores = model.site_scores(windows)
         entries = model.entries(windows).tolist()
+    require_finite(tooth_scores=scores.numpy())
     names = network.description.class_names
     odds = np.mean([_log_odds(of_input, names) for of_input in scores], axis=0)
     sites = model.sites(tooth_counts(turns.signals[0]))

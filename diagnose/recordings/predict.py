@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from diagnose.recordings.prepared import prepare_recording, tracking_facts, trained_at
 from diagnose.recordings.source import Source
-from diagnose.recordings.stored_network import StoredNetwork
+from diagnose.recordings.stored_network import StoredNetwork, require_finite
 from gensig.signals.mesh_motion import in_hertz
 
 if TYPE_CHECKING:
@@ -110,6 +110,7 @@ def _with_distances(
     from diagnose.networks.domain import distances
 
     distance = distances(domain, windows)
+    require_finite(distance=distance)
     beyond = distance > domain.threshold
     for row, far, is_beyond in zip(rows, distance, beyond, strict=True):
         row |= {"distance": float(far), "beyond": bool(is_beyond)}

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, final
 
+import numpy as np
 from torch.nn.functional import log_softmax
 
 from diagnose.data.targets import GEARS
@@ -15,7 +16,13 @@ from diagnose.networks.network import Network, SiteNetwork
 from diagnose.networks.registry import input_of
 from diagnose.recordings.prepared import PreparedRecording, tracking_text
 from diagnose.recordings.source import Source
-from diagnose.recordings.stored_network import Answer, Graph, Scores, StoredNetwork
+from diagnose.recordings.stored_network import (
+    Answer,
+    Graph,
+    Scores,
+    StoredNetwork,
+    require_finite,
+)
 from diagnose.recordings.tooth_classifier import (
     TOOTH_KIND,
     ToothClassifier,
@@ -82,11 +89,13 @@ class StoredClassifier(StoredNetwork):
         description, windows = self.description, prepared.windows
         log_probability = predict_windows(self.model, windows)
         _, by_record = over_records(log_probability, windows.record)
+        require_finite(class_probabilities=log_probability)
         overall = probabilities(by_record, description.temperature)[0]
         by_class = self._by_class(overall)
         heads = {}
         if isinstance(self.model, Network):
             heads = predict_heads(self.model, windows)
+            require_finite(**heads)
         severity = gear = None
         if "severity" in heads:
             severity = float(heads["severity"][0, overall.argmax()])
@@ -97,6 +106,7 @@ class StoredClassifier(StoredNetwork):
             gear, tooth, tooth_share = fault_site(
                 self.model, windows, int(overall.argmax())
             )
+            require_finite(tooth=np.array(tooth_share))
         by_window = probabilities(log_probability)
         speeds = description.speed_rpm_range
         return Answer(
@@ -159,6 +169,7 @@ class StoredClassifier(StoredNetwork):
         description = self.description
         windows = self.inputs().load(task, segments)
         by_window = predict_windows(self.model, windows)
+        require_finite(class_probabilities=by_window)
         record, log_probability = over_records(by_window, windows.record)
         calibration = calibration_scores(
             [log_probability], [task.labels()[record]], [description.temperature]

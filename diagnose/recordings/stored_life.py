@@ -15,7 +15,13 @@ from diagnose.recordings.followed import SPEED_TOLERANCE
 from diagnose.recordings.prepared import PreparedRecording
 from diagnose.recordings.raw_windows import N_CHECKED
 from diagnose.recordings.source import Source
-from diagnose.recordings.stored_network import Answer, Graph, Scores, StoredNetwork
+from diagnose.recordings.stored_network import (
+    Answer,
+    Graph,
+    Scores,
+    StoredNetwork,
+    require_finite,
+)
 from diagnose.scoring.judged import spread_text
 from diagnose.scoring.life_scores import (
     MEASURES,
@@ -92,6 +98,7 @@ class StoredLife(StoredNetwork):
         values = {name: known[name] for name in facts.told}
         conditions = np.array([list(values.values())], dtype=float)
         by_window = shares_of_windows(self.model, prepared.windows, conditions)
+        require_finite(remaining_life=by_window)
         level = facts.early_life_h
         share = float(np.clip(by_window.mean(), 0.0, 1.0))
         low, high = interval(np.array(share * level), facts.half_width_h, level)
@@ -177,6 +184,7 @@ class StoredLife(StoredNetwork):
         windows = self.inputs().load(task, segments)
         conditions = np.stack(columns, axis=1)
         record, share = shares_of_records(self.model, windows, conditions)
+        require_finite(remaining_life=share)
         prediction = LifePrediction(
             protocol=description.protocol,
             method=facts.method,

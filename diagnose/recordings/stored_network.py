@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.errors import DatasetError
+
 if TYPE_CHECKING:
     import torch
     from torch import nn
@@ -148,3 +150,20 @@ class StoredNetwork(ABC):
     @abstractmethod
     def graph(self) -> Graph:
         """The network as a graph, for other programs."""
+
+
+def require_finite(**answers: NDArray[np.floating]) -> None:
+    """Refuse answers of a network that are not finite, which no one may be told.
+
+    Raises
+    ------
+    DatasetError    naming the answer
+    """
+    for name, values in answers.items():
+        n_wrong = int(np.size(values) - np.isfinite(values).sum())
+        if n_wrong:
+            raise DatasetError(
+                f"the model gives no answer: {n_wrong} of {np.size(values)} values of its "
+                f"{name} are not finite; look at it with diagnose verify MODEL, and at the "
+                "recording"
+            )

@@ -12,8 +12,11 @@ from diagnose.baselines.estimators import LinearModel
 from diagnose.baselines.tooth_features import GEAR_FEATURES, tooth_features
 from diagnose.baselines.tooth_models import ToothLogistic
 from diagnose.data.packed_turns import turns_of
-from diagnose.training.store import DESCRIPTION, WEIGHTS, read_description, tensors_of
-from gensig.errors import DatasetError
+from diagnose.data.turns import PER_TOOTH, Turns
+from diagnose.training.model_files import DESCRIPTION, one_line, tensors_of
+from diagnose.training.store import check_answers, read_description
+from gensig.errors import ConfigError, DatasetError
+from gensig.options.configuration import whole_number
 
 TOOTH_KIND = ToothLogistic.text.name
 ARRAYS = ("fill", "mean", "scale", "weight", "bias")
@@ -54,18 +57,24 @@ def load_tooth_classifier(folder: str | Path) -> ToothClassifier:
     ------
     DatasetError    for a folder without description and arrays that belong together
     """
-    description, tensors = read_description(folder), tensors_of(Path(folder))
-    shapes = {name: tensors[name].shape for name in ARRAYS if name in tensors}
+    folder = Path(folder)
+    description = read_description(folder)
     n_features, n_classes = 2 * len(GEAR_FEATURES), len(description.class_names)
     row, label = (n_features,), (n_classes,)
-    expected = dict(
-        zip(ARRAYS, (row, row, row, (n_classes, n_features), label), strict=True)
-    )
-    if shapes != expected:
-        raise DatasetError(
-            f"{Path(folder) / WEIGHTS} does not fit {DESCRIPTION}: it holds no "
-            f"{TOOTH_KIND} of {n_features} features and {n_classes} classes"
-        )
+    shapes = (row, row, row, (n_classes, n_features), label)
+    kinds = {
+        name: ("float32", shape) for name, shape in zip(ARRAYS, shapes, strict=True)
+    }
+    tensors = tensors_of(folder, kinds)
     arrays = {name: tensors[name].astype(float) for name in ARRAYS}
-    samples_per_tooth = int(description.model["samples_per_tooth"])
-    return ToothClassifier(LinearModel(**arrays), samples_per_tooth)
+    try:
+        samples_per_tooth = whole_number(
+            PER_TOOTH, description.model[PER_TOOTH], at_least=1
+        )
+    except (ConfigError, KeyError, TypeError, ValueError) as error:
+        raise DatasetError(
+            f"{folder / DESCRIPTION} does not describe a {TOOTH_KIND}: {one_line(error)}"
+        ) from None
+    model = ToothClassifier(LinearModel(**arrays), samples_per_tooth)
+    check_answers(model, Turns.of, description, folder)
+    return model

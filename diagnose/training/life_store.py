@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from diagnose.scoring.life_scores import intervals_hold
+from diagnose.training.description_checks import LIFE, LIFE_COLUMNS
+from diagnose.training.model_files import DESCRIPTION, one_line
 from diagnose.training.store import (
-    DESCRIPTION,
     ModelDescription,
-    load_weights,
-    one_line,
+    check_answers,
     read_description,
+    with_weights,
 )
 from gensig.errors import DatasetError
 
@@ -59,6 +60,10 @@ class LifeFacts:
             raise ValueError(f"coverage {self.coverage!r} must lie between 0 and 1")
         if set(self.told) != set(self.told_range):
             raise ValueError("told and told_range name different columns")
+        if unknown := set(self.told) - set(LIFE_COLUMNS):
+            raise ValueError(
+                f"told names {', '.join(sorted(unknown))}; known: {', '.join(LIFE_COLUMNS)}"
+            )
 
     @property
     def intervals_hold(self) -> bool:
@@ -76,6 +81,7 @@ def load_life_model(
     DatasetError    for a folder without the two files, another schema, a classifier, or weights
         that do not belong to the network
     """
+    from diagnose.networks.registry import input_of
     from diagnose.training.remaining_life import LifeNetwork
 
     folder = Path(folder)
@@ -88,24 +94,23 @@ def load_life_model(
     facts = _facts(folder, description.remaining_life)
     n_told = len(facts.told)
     ones = [1.0] * len(description.channel_names)
-    model = LifeNetwork(description.network, ones, np.zeros(n_told), np.ones(n_told))
-    load_weights(model, folder)
-    return model.eval(), description, facts
+
+    def build() -> LifeNetwork:
+        told = np.zeros(n_told), np.ones(n_told)
+        return LifeNetwork(description.network, ones, *told)
+
+    model = with_weights(build, folder)
+    check_answers(
+        model, input_of, description, folder, (np.zeros((1, n_told), np.float32),)
+    )
+    return model, description, facts
 
 
 def _facts(folder: Path, content: Mapping[str, Any]) -> LifeFacts:
     try:
-        values = dict(content)
-        for name in ("early_life_h", "half_width_h", "coverage"):
-            values[name] = float(values[name])
-        values["n_calibration_lives"] = int(values["n_calibration_lives"])
-        values["told"] = tuple(map(str, values["told"]))
-        values["told_range"] = {
-            str(name): (float(low), float(high))
-            for name, (low, high) in values["told_range"].items()
-        }
+        values = LIFE("remaining_life", content)
         return LifeFacts(**values)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (TypeError, ValueError) as error:
         reason = one_line(error)
         raise DatasetError(
             f"{folder / DESCRIPTION} does not describe a model of remaining lives: {reason}"

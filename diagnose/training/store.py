@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-import json
-from collections.abc import Callable, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -15,22 +15,30 @@ from diagnose.data.teeth import common_teeth, teeth_range
 from diagnose.data.windows import Task, subset_segments
 from diagnose.settings import TrainSettings
 from diagnose.training.carried import Carried, carried_from, carried_in
+from diagnose.training.description_checks import OPTIONAL, REQUIRED, SCHEDULE
+from diagnose.training.model_files import (
+    DESCRIPTION,
+    DIGEST,
+    MODEL_SCHEMA_VERSION,
+    one_line,
+    read_content,
+    tensors_of,
+    write_files,
+)
 from gensig.errors import DatasetError
 from gensig.options.configuration import Section
 
 if TYPE_CHECKING:
     from torch import nn
 
+    from diagnose.data.inputs import NetworkInput
     from diagnose.networks.domain import Domain
     from diagnose.networks.network import Network
     from gensig.dataset.reader import Dataset
 
-MODEL_SCHEMA_VERSION = 2
-# Version 1 is without out_of_distribution and speed_rpm_range.
-READABLE_VERSIONS = (1, MODEL_SCHEMA_VERSION)
+Built = TypeVar("Built", bound="nn.Module")
 SHOWN_MODELS = 12  # in an error message
-WEIGHTS, DESCRIPTION = "model.safetensors", "model.json"
-UNUSED = "adaptation."  # tensors of models of versions before 0.15
+MOST_VALUES = 2**26  # numbers of a layer for one input; 256 MiB
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +60,7 @@ class ModelDescription:
     remaining_life : see `diagnose.training.life_store`; None for a classifier
     carried : blocks of recordings that carried implants; None for a network of any other data set,
         and in older models
+    files : name -> size and sha256 of the files beside ``model.json``; None in older models
     """
 
     model_schema_version: int
@@ -78,6 +87,7 @@ class ModelDescription:
     test_score: dict[str, Any] | None = None
     remaining_life: dict[str, Any] | None = None
     carried: Carried | None = None
+    files: dict[str, dict[str, Any]] | None = None
 
     @property
     def network(self) -> Section:
@@ -99,11 +109,10 @@ class ModelDescription:
         """Task of the training, one of `diagnose.settings.TASKS`."""
         return "classes" if self.remaining_life is None else "remaining_life"
 
-    def __post_init__(self) -> None:
-        if not 0 < self.temperature < float("inf"):
-            raise ValueError(
-                f"temperature must be greater than 0, not {self.temperature!r}"
-            )
+    @property
+    def is_signed(self) -> bool:
+        """True if the folder can be told from a damaged one by its digests."""
+        return self.files is not None
 
 
 class Trained(Protocol):
@@ -171,17 +180,11 @@ def model_description(
 def save_model(
     folder: Path, weights: Mapping[str, np.ndarray], description: ModelDescription
 ) -> None:
-    """Write both files into a new folder."""
-    from safetensors.numpy import save_file
-
-    folder.mkdir(parents=True, exist_ok=True)
-    arrays = {name: np.ascontiguousarray(value) for name, value in weights.items()}
-    save_file(arrays, folder / WEIGHTS)
+    """Write both files into a folder, with their digests."""
     content = asdict(description)
     if description.carried is not None:
         content["carried"] = description.carried.content()
-    text = json.dumps(content, indent=2) + "\n"
-    (folder / DESCRIPTION).write_text(text, encoding="utf-8")
+    write_files(folder, weights, content)
 
 
 def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
@@ -190,9 +193,10 @@ def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
     Raises
     ------
     DatasetError    for a folder without the two files, another schema, a network of remaining
-        lives, or weights that do not belong to the network
+        lives, or weights that are damaged or do not belong to the network
+    ConfigError     for parameters that no network takes
     """
-    from diagnose.networks.registry import build_model
+    from diagnose.networks.registry import build_model, input_of
 
     folder = Path(folder)
     description = read_description(folder)
@@ -201,37 +205,93 @@ def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
             f"{folder} says remaining lives and is no classifier: "
             "for diagnose predict, evaluate, export"
         )
-    model = build_model(
-        description.network,
-        n_channels=description.n_channels,
-        n_classes=len(description.class_names),
-    )
-    load_weights(model, folder)
-    return model.eval(), description
+
+    def build() -> Network:
+        return build_model(
+            description.network,
+            n_channels=description.n_channels,
+            n_classes=len(description.class_names),
+        )
+
+    model = with_weights(build, folder)
+    check_answers(model, input_of, description, folder)
+    return model, description
 
 
-def load_weights(model: nn.Module, folder: Path) -> None:
-    """Fill a network with the weights of a folder.
+def with_weights(build: Callable[[], Built], folder: Path) -> Built:
+    """Network in evaluation mode with the weights of a folder.
+
+    It is built without memory first, so that absurd sizes are refused before they are allocated.
 
     Raises
     ------
-    DatasetError    for weights that do not belong to the network
+    DatasetError    for weights that are damaged or do not belong to the network
     """
     import torch
 
-    from diagnose.networks.domain import TENSOR
-
-    weights = {
-        name: torch.from_numpy(value)
-        for name, value in tensors_of(folder).items()
-        if name != TENSOR and not name.startswith(UNUSED)
+    with torch.device("meta"):
+        planned = build().state_dict()
+    expected = {
+        name: (str(value.dtype).removeprefix("torch."), tuple(value.shape))
+        for name, value in planned.items()
     }
+    tensors = tensors_of(folder, expected)
+    model = build()
+    model.load_state_dict({name: torch.from_numpy(tensors[name]) for name in expected})
+    return model.eval()
+
+
+def check_answers(
+    model: nn.Module,
+    read_input: Callable[[Section], NetworkInput],
+    description: ModelDescription,
+    folder: Path,
+    further: Sequence[np.ndarray] = (),
+) -> None:
+    """Try a network on a silent input, whose values it must take.
+
+    Parameters
+    ----------
+    read_input : kind of input of the parameters of a network
+    further : inputs beside the windows
+
+    Raises
+    ------
+    DatasetError    for a network that takes no such input, of too much memory, or whose answers
+        are not finite
+    """
+    import torch
+
     try:
-        model.load_state_dict(weights)
-    except (RuntimeError, TypeError) as error:
+        inputs = read_input(description.network)
+        single = inputs.example(1, description.window_samples)
+        largest = max([1, *_whole_numbers(description.model)])
+        if single.size * max(description.n_channels, largest) > MOST_VALUES:
+            raise ValueError(f"a window takes more than {MOST_VALUES} numbers")
+        example = inputs.example(description.n_channels, description.window_samples)
+        given = map(torch.from_numpy, (example, *further))
+        with torch.inference_mode():
+            answer = model(*given)
+        is_usable = len(answer) == 1 and bool(torch.isfinite(answer).all())
+    except Exception as error:  # torch raises whatever stopped it
         raise DatasetError(
-            f"{folder / WEIGHTS} does not fit {DESCRIPTION}: {one_line(error)}"
+            f"{folder / DESCRIPTION} describes a network that takes no input: {one_line(error)}"
         ) from None
+    if not is_usable:
+        raise DatasetError(
+            f"{folder} answers numbers that are not finite to a silent input; the model is "
+            "damaged: restore it or train it again"
+        )
+
+
+def _whole_numbers(parameters: Mapping[str, Any]) -> Iterator[int]:
+    """Whole numbers of a network's parameters, but for its schedule."""
+    for key, value in parameters.items():
+        if key == SCHEDULE:
+            continue
+        for entry in value if isinstance(value, list) else (value,):
+            if type(entry) is int:
+                yield entry
 
 
 def load_domain(folder: str | Path, description: ModelDescription) -> Domain | None:
@@ -249,21 +309,6 @@ def load_domain(folder: str | Path, description: ModelDescription) -> Domain | N
         return domain_from(description.out_of_distribution, tensors_of(Path(folder)))
     except DatasetError as error:
         raise DatasetError(f"{folder}: {error}") from None
-
-
-def tensors_of(folder: Path) -> dict[str, np.ndarray]:
-    """All arrays of the file of weights, by their names."""
-    from safetensors import SafetensorError
-    from safetensors.numpy import load_file
-
-    try:
-        return load_file(folder / WEIGHTS)
-    except FileNotFoundError:
-        raise DatasetError(f"{folder} holds no {WEIGHTS}") from None
-    except (SafetensorError, OSError, KeyError) as error:
-        raise DatasetError(
-            f"{folder / WEIGHTS} is not a safetensors file: {one_line(error)}"
-        ) from None
 
 
 def schema_version(dataset: Dataset) -> int | None:
@@ -292,18 +337,13 @@ def read_description(folder: str | Path) -> ModelDescription:
     """
     folder = Path(folder)
     path = folder / DESCRIPTION
+    if not os.path.lexists(path):
+        raise DatasetError(_no_model(folder))
+    content = read_content(folder)
+    content.pop(DIGEST, None)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        version = content["model_schema_version"]
-        if version not in READABLE_VERSIONS:
-            known = " and ".join(map(str, READABLE_VERSIONS))
-            raise DatasetError(
-                f"{path}: model schema {version!r}, this program reads {known}"
-            )
         return ModelDescription(**_typed(content))
-    except FileNotFoundError:
-        raise DatasetError(_no_model(folder)) from None
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise DatasetError(
             f"{path} does not describe a model: {one_line(error)}"
         ) from None
@@ -327,46 +367,13 @@ def _no_model(folder: Path) -> str:
 def _typed(content: Mapping[str, Any]) -> dict[str, Any]:
     """Values of ``model.json`` in the types of `ModelDescription`."""
     values = dict(content)
-    values["sampling_rate_hz"] = float(values["sampling_rate_hz"])
-    for name in ("window_samples", "stride_samples"):
-        if not isinstance(values[name], int) or values[name] < 1:
-            raise ValueError(f"{name} {values[name]!r} is no positive whole number")
-    for name in ("class_names", "channel_names"):
-        values[name] = tuple(map(str, values[name]))
-    for name, convert in _OPTIONAL.items():
+    for name, reader in REQUIRED.items():
+        values[name] = reader(name, values[name])
+    for name, reader in OPTIONAL.items():
         if values.get(name) is not None:
-            values[name] = convert(values[name])
+            values[name] = reader(name, values[name])
+    if values.get("temperature", 1.0) is None:
+        raise ValueError("temperature is null")
+    if values.get("carried") is not None:
+        values["carried"] = carried_from(values["carried"])
     return values
-
-
-def _range(values: Sequence[Any]) -> tuple[float, float]:
-    low, high = values
-    return float(low), float(high)
-
-
-def _teeth(values: Sequence[Any]) -> tuple[int, int]:
-    driving, driven = values
-    return int(driving), int(driven)
-
-
-def _teeth_range(values: Sequence[Any]) -> tuple[tuple[int, int], tuple[int, int]]:
-    driving, driven = values
-    return _teeth(driving), _teeth(driven)
-
-
-_OPTIONAL: dict[str, Callable[[Any], Any]] = {
-    "test_channel_names": lambda names: tuple(map(str, names)),
-    "speed_rpm_range": _range,
-    "n_teeth": _teeth,
-    "n_teeth_range": _teeth_range,
-    "out_of_distribution": dict,
-    "adaptation": dict,
-    "remaining_life": dict,
-    "test_score": dict,
-    "carried": carried_from,
-}
-
-
-def one_line(error: Exception) -> str:
-    """Text of an error on one line, cut to 160 characters."""
-    return " ".join(str(error).split())[:160]

@@ -8,12 +8,14 @@ import secrets
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from io import BufferedReader
 from pathlib import Path
 
 from gensig.errors import DatasetError, WriteError
 
 TEMPORARY_SUFFIX = ".tmp"
 INSTEAD = "choose another out=DIR"  # remedy that helps whatever the disk says
+DATA_SET = "data set"
 # remedies where the disk refuses to write, by the number of the error
 REMEDIES = {
     errno.ENOSPC: "free some space there",
@@ -195,7 +197,30 @@ def read_text(path: Path, *, limit: int, follow_links: bool = False) -> str:
 
 
 def _ordinary_bytes(path: Path, *, limit: int, follow_links: bool) -> bytes:
-    """Bytes of an ordinary file; type and size are asked of what was opened, not of its name."""
+    """Bytes of an ordinary file of at most so many."""
+    with open_ordinary(path, follow_links=follow_links) as file:
+        refuse_larger(path, file, limit)
+        return file.read()
+
+
+def open_ordinary(
+    path: Path, *, follow_links: bool = False, part_of: str = DATA_SET
+) -> BufferedReader:
+    """An ordinary file of a stranger, open for reading; never waits.
+
+    The type is asked of what was opened, not of its name.
+
+    Parameters
+    ----------
+    path : Path
+    follow_links : bool    False refuses a symbolic link, True opens its target
+    part_of : str          thing that the file belongs to, for messages
+
+    Raises
+    ------
+    DatasetError    when it is absent, a link, a folder, a pipe or a device
+    OSError         when the system refuses
+    """
     flags = os.O_RDONLY | os.O_NONBLOCK  # a named pipe must not hang
     if not follow_links:
         flags |= os.O_NOFOLLOW
@@ -203,32 +228,38 @@ def _ordinary_bytes(path: Path, *, limit: int, follow_links: bool) -> bytes:
         descriptor = os.open(path, flags)
     except OSError as error:
         if error.errno == errno.ELOOP:
-            raise DatasetError(link_text(path)) from error
+            raise DatasetError(link_text(path, part_of)) from error
         if error.errno in (errno.ENOENT, errno.ENOTDIR, errno.ENXIO):
-            raise _no_file(path) from error
+            raise _no_file(path, part_of) from error
         raise
-    with os.fdopen(descriptor, "rb") as file:
-        status = os.fstat(descriptor)
-        if not stat.S_ISREG(status.st_mode):
-            raise _no_file(path)
-        if status.st_size > limit:
-            raise DatasetError(
-                f"{path} has {status.st_size} bytes, at most {limit} are allowed; it is no file "
-                "of a gensig data set"
-            )
-        return file.read()
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise _no_file(path, part_of)
+    return os.fdopen(descriptor, "rb")
 
 
-def _no_file(path: Path) -> DatasetError:
+def refuse_larger(
+    path: Path, file: BufferedReader, limit: int, part_of: str = DATA_SET
+) -> None:
+    """Raise DatasetError for an open file of more bytes than a limit."""
+    size = os.fstat(file.fileno()).st_size
+    if size > limit:
+        raise DatasetError(
+            f"{path} has {size} bytes, at most {limit} are allowed; it is no file of a "
+            f"gensig {part_of}"
+        )
+
+
+def _no_file(path: Path, part_of: str) -> DatasetError:
     return DatasetError(
-        f"{path} is missing or no ordinary file; the folder is damaged or no gensig data set"
+        f"{path} is missing or no ordinary file; the folder is damaged or no gensig {part_of}"
     )
 
 
-def link_text(path: Path) -> str:
-    """The line on a symbolic link, which is never a part of a data set."""
+def link_text(path: Path, part_of: str = DATA_SET) -> str:
+    """The line on a symbolic link, which is never a part of a data set or a model."""
     return (
-        f"{path} is a symbolic link; a data set holds its files itself: put the file or folder "
+        f"{path} is a symbolic link; a {part_of} holds its files itself: put the file or folder "
         "in place of the link"
     )
 
