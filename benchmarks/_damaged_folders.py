@@ -47,9 +47,9 @@ def mutate(folder: Path, seed: int) -> Mutant:
         "text",
     )[seed % 8]
     if family == "bytes":
-        return _damage(folder, _file(folder, rng), rng)
+        return damage(folder, _file(folder, rng), rng)
     if family == "forged bytes":
-        damaged = _damage(folder, _shard(folder, rng), rng)
+        damaged = damage(folder, _shard(folder, rng), rng)
         forge(folder)
         return Mutant(kind=f"forged {damaged.kind}", forged=True)
     if family == "structure":
@@ -114,7 +114,7 @@ def _shard(folder: Path, rng: np.random.Generator) -> Path:
     )
 
 
-def _damage(folder: Path, path: Path, rng: np.random.Generator) -> Mutant:
+def damage(folder: Path, path: Path, rng: np.random.Generator) -> Mutant:
     """Flipped, overwritten, lost, doubled or swapped bytes.
 
     Half of them in the head, where HDF5 keeps its tables.
@@ -386,7 +386,7 @@ def _manifest(folder: Path, number: int, rng: np.random.Generator) -> Mutant:
         forgeries[name]()
         path.write_text(json.dumps(content), encoding="utf-8")
     elif name == "text":
-        damaged = _damage(folder, path, rng)
+        damaged = damage(folder, path, rng)
         return Mutant(kind=f"manifest {damaged.kind}")
     else:
         place = (

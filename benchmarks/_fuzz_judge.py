@@ -113,16 +113,33 @@ def _meaning(folder: Path) -> dict[str, Any]:
     return {name: value for name, value in content.items() if name in known}
 
 
+Work = Callable[[Path, Path, range, Connection], None]
+
+
 def _work(template: Path, scratch: Path, seeds: range, pipe: Connection) -> None:
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     whole = _meaning(template)
+    try_mutants(
+        (template, scratch, seeds, pipe),
+        lambda folder, seed: mutate(folder, seed),
+        lambda folder, mutant: judge(folder, mutant, whole),
+    )
+
+
+def try_mutants(
+    given: tuple[Path, Path, range, Connection],
+    mutated: Callable[[Path, int], Mutant],
+    judged: Callable[[Path, Mutant], tuple[str, bool, bool]],
+) -> None:
+    """Judge a mutant a seed, and send what came of it through the pipe."""
+    template, scratch, seeds, pipe = given
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     for seed in seeds:
         folder = scratch / f"mutant-{seed}" / "set"
         shutil.copytree(template, folder)
-        mutant = mutate(folder, seed)
+        mutant = mutated(folder, seed)
         pipe.send((seed, mutant.kind, None, False, False))
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        fault, noticed, refused = judge(folder, mutant, whole)
+        fault, noticed, refused = judged(folder, mutant)
         grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024
         if grown > MEMORY_LIMIT:
             fault += f"; took {grown} bytes of memory"
@@ -130,15 +147,17 @@ def _work(template: Path, scratch: Path, seeds: range, pipe: Connection) -> None
         shutil.rmtree(folder.parent)
 
 
-def verdicts(template: Path, scratch: Path, seeds: range) -> Iterator[Verdict]:
-    """A verdict a seed.
+def verdicts(
+    template: Path, scratch: Path, seeds: range, work: Work = _work
+) -> Iterator[Verdict]:
+    """A verdict a seed; ``work`` tries the mutants of some seeds in a process of its own.
 
     A process that dies or hangs is one too, and another takes over behind it.
     """
     context = multiprocessing.get_context(METHOD)
     while len(seeds):
         here, there = context.Pipe(duplex=False)
-        worker = context.Process(target=_work, args=(template, scratch, seeds, there))
+        worker = context.Process(target=work, args=(template, scratch, seeds, there))
         worker.start()
         there.close()
         seed, kind, fault = seeds[0], "not begun", "died"

@@ -34,8 +34,8 @@ from diagnose.scoring.metrics import (
 )
 from diagnose.settings import TrainSettings, settings_from
 from diagnose.training.classes import Classes, predict_windows
+from diagnose.training.model_files import MODEL_SCHEMA_VERSION
 from diagnose.training.store import (
-    MODEL_SCHEMA_VERSION,
     ModelDescription,
     save_model,
 )
@@ -368,8 +368,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         judged.append(result)
         say(result.row())
     description = describe(settings, words, training, domain, judged[0])
-    save_model(given.folder, training.weights() | domain.tensors(), description)
-    (given.folder / "README.md").write_text(card(words, settings, judged))
+    tensors = training.weights() | domain.tensors()
+    beside = {"README.md": card(words, settings, judged)}
+    save_model(given.folder, tensors, description, beside)
     say(f"{given.folder}: network and card")
 
 

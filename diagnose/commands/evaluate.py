@@ -7,7 +7,12 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
-from diagnose.commands.parser import add_model, add_overrides, refuse_existing
+from diagnose.commands.parser import (
+    add_model,
+    add_overrides,
+    note_unsigned,
+    refuse_existing,
+)
 from gensig.errors import ConfigError
 from gensig.terminal.printing import remark, show
 
@@ -53,7 +58,9 @@ def run(arguments: Namespace) -> int:
     channels = None
     if "channels" in values:
         channels = values["channels"].strip("[]").split(",")
-    network = open_network(model or shipped_network())
+    folder = model or shipped_network()
+    network = open_network(folder)
+    note_unsigned(folder, network.description)
     evaluation = evaluate_network(
         network,
         open_dataset(values["data"]),

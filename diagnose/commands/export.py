@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from diagnose.commands.parser import add_model
+from diagnose.commands.parser import add_model, note_unsigned
 from gensig.errors import ConfigError, DatasetError
 from gensig.terminal.printing import show
 
@@ -51,7 +51,9 @@ def run(arguments: Namespace) -> int:
     from diagnose.recordings.registry import open_network
 
     need_packages()
-    agreement = export_onnx(open_network(arguments.model), out)
+    network = open_network(arguments.model)
+    note_unsigned(arguments.model, network.description)
+    agreement = export_onnx(network, out)
     size = out.stat().st_size / 1e3
     show(f"{out}: {size:.0f} kB, {agreement} on windows of many levels")
     return 0

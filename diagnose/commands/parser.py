@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gensig.errors import DatasetError
+
+if TYPE_CHECKING:
+    from diagnose.training.store import ModelDescription
 
 
 def add_overrides(parser: ArgumentParser, metavar: str = "key=value") -> None:
@@ -85,6 +90,14 @@ def add_recording_options(parser: ArgumentParser) -> None:
         metavar="NAME",
         help="array of .npz, .h5 or .mat files (default: acceleration)",
     )
+
+
+def note_unsigned(folder: str | Path, description: ModelDescription) -> None:
+    """Say on stderr that a model of an older version has no sha256 to be checked by."""
+    from diagnose.training.model_files import NOT_SIGNED
+
+    if not description.is_signed:
+        print(f"diagnose: note: {folder} {NOT_SIGNED}", file=sys.stderr, flush=True)
 
 
 def refuse_existing(folder: Path) -> None:

@@ -14,6 +14,7 @@ from diagnose.commands.parser import (
     add_recordings,
     add_sampling_rate,
     add_tacho,
+    note_unsigned,
 )
 from gensig.errors import ConfigError
 from gensig.terminal.printing import show, show_text
@@ -141,6 +142,7 @@ def run(arguments: Namespace) -> int:
         raise ConfigError(f"--plot {arguments.plot} must end in .png")
     folder = arguments.model or shipped_network()
     network = open_network(folder)
+    note_unsigned(folder, network.description)
     if arguments.held_out and network.description.carried is None:
         raise ConfigError(
             f"--held-out: {folder} knows of no implants (trained on none, or too old); leave it out"

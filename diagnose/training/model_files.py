@@ -46,20 +46,28 @@ Kind = tuple[str, tuple[int, ...]]  # type of NumPy, shape
 
 
 def write_files(
-    folder: Path, weights: Mapping[str, NDArray[Any]], content: Mapping[str, Any]
+    folder: Path,
+    weights: Mapping[str, NDArray[Any]],
+    content: Mapping[str, Any],
+    beside: Mapping[str, str],
 ) -> None:
-    """Write both files into a folder, which is made; the description last."""
+    """Write the files of a model into a folder, which is made; the description last.
+
+    Parameters
+    ----------
+    beside : name -> text of files beside the two
+    """
     from safetensors.numpy import save
 
     folder.mkdir(parents=True, exist_ok=True)
-    arrays = {name: np.ascontiguousarray(value) for name, value in weights.items()}
+    arrays = {name: np.array(value, order="C") for name, value in weights.items()}
     write_bytes(folder / WEIGHTS, save(arrays))
-    write_text(folder / DESCRIPTION, signed_text(folder, content))
+    for name, text in beside.items():
+        write_text(folder / name, text)
+    write_text(folder / DESCRIPTION, signed_text(folder, content, (WEIGHTS, *beside)))
 
 
-def signed_text(
-    folder: Path, content: Mapping[str, Any], names: Sequence[str] = (WEIGHTS,)
-) -> str:
+def signed_text(folder: Path, content: Mapping[str, Any], names: Sequence[str]) -> str:
     """Text of a description with the digests that files of the folder have now."""
     signed = dict(content) | {
         "model_schema_version": MODEL_SCHEMA_VERSION,

@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
@@ -178,13 +179,16 @@ def model_description(
 
 
 def save_model(
-    folder: Path, weights: Mapping[str, np.ndarray], description: ModelDescription
+    folder: Path,
+    weights: Mapping[str, np.ndarray],
+    description: ModelDescription,
+    beside: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
-    """Write both files into a folder, with their digests."""
+    """Write both files into a folder, with their digests, and texts ``beside`` by their names."""
     content = asdict(description)
     if description.carried is not None:
         content["carried"] = description.carried.content()
-    write_files(folder, weights, content)
+    write_files(folder, weights, content, beside)
 
 
 def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
