@@ -148,13 +148,19 @@ def try_mutants(
 
 
 def verdicts(
-    template: Path, scratch: Path, seeds: range, work: Work = _work
+    template: Path,
+    scratch: Path,
+    seeds: range,
+    work: Work = _work,
+    limit: float | None = None,
 ) -> Iterator[Verdict]:
     """A verdict a seed; ``work`` tries the mutants of some seeds in a process of its own.
 
-    A process that dies or hangs is one too, and another takes over behind it.
+    A mutant may take ``limit`` seconds, the first one with the start of the process; None takes
+    `TIME_LIMIT`. A process that dies or hangs is one too, and another takes over behind it.
     """
     context = multiprocessing.get_context(METHOD)
+    limit = limit or TIME_LIMIT
     while len(seeds):
         here, there = context.Pipe(duplex=False)
         worker = context.Process(target=work, args=(template, scratch, seeds, there))
@@ -163,8 +169,8 @@ def verdicts(
         seed, kind, fault = seeds[0], "not begun", "died"
         while True:
             try:
-                if not here.poll(TIME_LIMIT):
-                    fault = f"hung for {TIME_LIMIT:g} s"
+                if not here.poll(limit):
+                    fault = f"hung for {limit:g} s"
                     break
                 seed, kind, outcome, noticed, refused = here.recv()
             except EOFError:

@@ -21,7 +21,10 @@ from diagnose.training.remaining_life import LifeNetwork
 from diagnose.training.store import ModelDescription, save_model
 from gensig.options.configuration import Section
 
-RATE, SECONDS = 51_200, 0.8  # of the recordings, as in the training of the shipped network
+RATE, SECONDS = (
+    51_200,
+    0.8,
+)  # of the recordings, as in the training of the shipped network
 SPEED_RPM, TEETH = 1500.0, (23, 46)
 WINDOW = 1024
 CLASSES = ("healthy", "crack", "pitting")
@@ -55,9 +58,7 @@ GEARS = ("--speed-rpm", f"{SPEED_RPM:g}", "--teeth", *map(str, TEETH), "--as-rec
 ASKED = (
     Asked(name="cnn", options=("--speed-rpm", f"{SPEED_RPM:g}")),
     Asked(name="any_pair", options=GEARS),
-    Asked(
-        name="hours", options=("--speed-rpm", f"{SPEED_RPM:g}", "--torque-nm", "20")
-    ),
+    Asked(name="hours", options=("--speed-rpm", f"{SPEED_RPM:g}", "--torque-nm", "20")),
     Asked(name="tooth_logistic", options=GEARS),
 )
 
@@ -65,9 +66,7 @@ ASKED = (
 def make_models(folder: Path) -> None:
     """Write one model of each kind of `ASKED` and the recording into a folder."""
     folder.mkdir(parents=True)
-    np.savez(
-        folder / RECORDING, acceleration=_recording()[None], sampling_rate_hz=RATE
-    )
+    np.savez(folder / RECORDING, acceleration=_recording()[None], sampling_rate_hz=RATE)
     shutil.copytree(shipped_network(), folder / "any_pair")
     rng = np.random.default_rng(0)
     torch.manual_seed(0)

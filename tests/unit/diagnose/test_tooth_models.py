@@ -12,6 +12,7 @@ from safetensors.numpy import load_file, save_file
 from scipy.special import logsumexp
 from small_studies import TINY_CNN, study_of
 
+from benchmarks._damaged_models import forge
 from diagnose.baselines.estimators import linear_model, logistic_regression
 from diagnose.baselines.features import FeatureTable
 from diagnose.baselines.tooth_features import (
@@ -199,8 +200,9 @@ def test_arrays_of_another_baseline_are_refused(stored, capsys, tmp_path):
     shutil.copytree(model_of(out, "by_unit-tooth_logistic-seed0"), folder)
     tensors = load_file(folder / "model.safetensors")
     save_file({**tensors, "mean": tensors["mean"][:5]}, folder / "model.safetensors")
+    forge(folder)
     words = ["predict", "--model", folder, "a.npy"]
-    refuses(capsys, words, "does not fit model.json: it holds no tooth_logistic")
+    refuses(capsys, words, "does not fit model.json: mean is float32 (5)")
 
 
 @pytest.mark.parametrize("classes", [(0, 1, 3), (1, 3)])

@@ -9,6 +9,7 @@ from implant_samples import CARRIER_RATE, CARRIER_SPEED, CARRIER_TEETH, carrier
 from scipy.signal import resample_poly
 
 import gensig
+from benchmarks._damaged_models import forge
 from diagnose.cli import main
 from diagnose.data.windows import subset_segments, task_of
 from diagnose.training.carried import Carried, blocks_of, carried_in
@@ -268,7 +269,7 @@ def described(made, folder):
 
 
 def write(folder, content):
-    (folder / "model.json").write_text(json.dumps(content))
+    forge(folder, content)
 
 
 def test_a_model_of_an_earlier_version_is_read_and_refuses_nothing(

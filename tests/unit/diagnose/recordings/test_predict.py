@@ -13,6 +13,7 @@ from scipy import io
 from scipy.io import wavfile
 from small_studies import task_on
 
+from benchmarks._damaged_models import forge
 from diagnose.data.windows import Segments, load_windows
 from diagnose.networks.domain import band_levels
 from diagnose.recordings.predict import predict_recording
@@ -20,6 +21,7 @@ from diagnose.recordings.registry import open_network
 from diagnose.recordings.source import Source
 from diagnose.recordings.verdict import class_text, score_text, verdict
 from diagnose.training.classes import predict_windows
+from diagnose.training.model_files import MODEL_SCHEMA_VERSION
 from diagnose.training.store import load_domain, load_model
 
 RATE = 12800
@@ -126,8 +128,7 @@ def test_a_folder_of_a_version_that_adapted_is_still_predicted_with(
     old = {"adaptation.features": np.ones((3, 2)), "adaptation.mean.x": np.ones(2)}
     facts = {"method": "coral", "matched": "healthy", "recordings": []}
     save_file(tensors | old, tmp_path / "model.safetensors")
-    text = json.dumps({**description, "adaptation": facts})
-    (tmp_path / "model.json").write_text(text)
+    forge(tmp_path, {**description, "adaptation": facts})
 
     words = ("predict", file, "--json", "--model")
     as_trained, adapted = (
@@ -201,9 +202,14 @@ def test_a_model_stores_its_score_and_several_recordings_are_answered(
 def copied(model, folder, change, tensors):
     """Copy of a model with another description and other tensors."""
     content = json.loads(Path(model, "model.json").read_text())
-    change(content)
-    (folder / "model.json").write_text(json.dumps(content))
     save_file(tensors, folder / "model.safetensors")
+    forge(folder, content)
+    content = json.loads((folder / "model.json").read_text())
+    change(content)
+    if content["model_schema_version"] == MODEL_SCHEMA_VERSION:
+        forge(folder, content)
+    else:
+        (folder / "model.json").write_text(json.dumps(content))
     return str(folder)
 
 
@@ -212,7 +218,7 @@ def test_an_older_model_predicts_without_a_flag(
 ):
     def of_version_1(content):
         added = ("speed_rpm_range", "out_of_distribution", "test_score", "temperature")
-        for key in added:
+        for key in (*added, "files", "sha256"):
             del content[key]
         content["model_schema_version"] = 1
 
@@ -312,12 +318,15 @@ def setting(**values):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (setting(model_schema_version=9), "model schema 9, this program reads 1 and 2"),
+        (
+            setting(model_schema_version=9),
+            "model schema 9, this program reads 1, 2 and 3",
+        ),
         (setting(sampling_rate_hz="fast"), "does not describe a model"),
         (setting(temperature=0), "does not describe a model"),
         (setting(temperature="warm"), "does not describe a model"),
         (setting(class_names=["healthy", "crack"]), "does not fit model.json"),
-        (setting(window_samples=0), "window_samples 0 is no positive whole number"),
+        (setting(window_samples=0), "window_samples 0 is no whole number from 1"),
         (setting(speed_rpm_range=[1]), "does not describe a model"),
         (in_flag(method="guess"), "out-of-distribution flag is 'guess'"),
         (
@@ -336,7 +345,7 @@ def test_a_wrong_description_is_refused(change, message, model, tmp_path, capsys
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda levels: levels * np.nan, "holds no levels of windows"),
+        (lambda levels: levels * np.nan, "'domain.levels' holds numbers that are not"),
         (lambda levels: levels[0], "holds no levels of windows"),
         (lambda levels: levels[:, 1:], "flag has 23 levels, a window 24"),
     ],

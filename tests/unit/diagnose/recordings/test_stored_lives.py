@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 from refusals import refused
 from runs import metrics_of, model_of, refuses, rows_of, says, serve
 
+from benchmarks._damaged_models import forge
 from diagnose.scoring.life_scores import MEASURES
 from diagnose.training.life_store import LifeFacts, load_life_model
 from diagnose.training.store import load_model
@@ -236,7 +237,8 @@ def test_classifiers_and_networks_of_lives_are_not_confused(
 def test_a_wrong_description_is_refused(change, models, tmp_path):
     content = description_of(models["cnn"])
     content["remaining_life"] |= change
-    (tmp_path / "model.json").write_text(json.dumps(content))
+    (tmp_path / "model.safetensors").write_bytes(b"")
+    forge(tmp_path, content)
     with refused("does not describe a model of remaining lives", DatasetError):
         load_life_model(tmp_path)
 
@@ -262,6 +264,9 @@ def test_weights_of_another_network_are_refused(life_study, tmp_path):
     for method, name in zip(METHODS, ("model.json", "model.safetensors"), strict=True):
         content = (folders / f"by_unit-{method}-seed0" / name).read_bytes()
         (tmp_path / name).write_bytes(content)
+    with refused("was altered", DatasetError):
+        load_life_model(tmp_path)
+    forge(tmp_path)
     with refused("does not fit", DatasetError):
         load_life_model(tmp_path)
 
