@@ -183,7 +183,7 @@ def verdicts(
                     noticed=noticed,
                     refused=refused,
                 )
-                seeds = range(seed + 1, seeds.stop)
+                seeds = range(seed + seeds.step, seeds.stop, seeds.step)
                 if not len(seeds):
                     worker.join()
                     return
@@ -193,4 +193,4 @@ def verdicts(
         yield Verdict(
             seed=seeds[0], kind=kind, fault=fault, noticed=False, refused=False
         )
-        seeds = range(seeds[0] + 1, seeds.stop)
+        seeds = seeds[1:]

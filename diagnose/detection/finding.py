@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
+from gensig.errors import DatasetError
 from gensig.signals.handbook_rule import HandbookAnswer
 
 Kind = Literal["healthy", "shaft", "mesh", "broadband", "impulses"]
@@ -103,3 +105,12 @@ class Finding:
     speed_rpm: float
     speed_by: str
     notes: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        ratios = [change.ratio for change in self.changes]
+        numbers = (self.score, self.level_db, self.rank_probability, self.speed_rpm)
+        if not all(map(math.isfinite, (*numbers, *ratios))):
+            raise DatasetError(
+                f"{self.name} gets no finite score; a channel is constant or its values are out "
+                "of range: check it and the healthy recordings"
+            )

@@ -37,6 +37,15 @@ MODELS: dict[str, type[Network]] = {
 OTHERWISE = "otherwise"
 INPUT_KEYS = ("halves", "each_channel", "whitened", "redraws")  # of the input alone
 NOT_OF_NETWORK = ("name", "kind", "training", OTHERWISE, *INPUT_KEYS)
+# errors of parameters that make no network, as an empty list of widths or a stride of 0
+UNFIT = (
+    TypeError,
+    ValueError,
+    RuntimeError,
+    ArithmeticError,
+    LookupError,
+    AttributeError,
+)
 
 
 def build_model(
@@ -69,7 +78,7 @@ def build_model(
             input_scale=input_scale,
             **parameters,
         )
-    except (TypeError, ValueError, RuntimeError) as error:
+    except UNFIT as error:
         reason = " ".join(str(error).split())
         raise ConfigError(f"model {config['kind']}: {reason}") from None
 

@@ -214,6 +214,8 @@ def _labels(
 
 def _rows(path: Path) -> list[dict[str, str]]:
     """Rows of the file; refuses one that is no CSV with the required columns."""
+    if path.exists() and not path.is_file():
+        raise DatasetError(f"{path} is no ordinary file; give a CSV file")
     if path.is_file() and path.stat().st_size > LARGEST_FILE:
         size = path.stat().st_size
         raise DatasetError(

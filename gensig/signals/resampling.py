@@ -14,6 +14,8 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gensig.errors import ConfigError
+
 FloatArray = NDArray[np.floating]
 
 # of the lower rate, as in gensig.dynamics.decimation: recorders of 2.56 samples a cycle
@@ -100,6 +102,16 @@ class RateChange:
 
 
 def rate_change(given: float, wanted: float) -> RateChange:
-    """Change to the nearest rate by a ratio of whole numbers up to `MOST_STEPS`."""
+    """Change to the nearest rate by a ratio of whole numbers up to `MOST_STEPS`.
+
+    Raises
+    ------
+    ConfigError    for rates more than `MOST_STEPS` times apart
+    """
+    if not given <= wanted * MOST_STEPS <= given * MOST_STEPS**2:
+        raise ConfigError(
+            f"{given:g} samples a second cannot be changed to {wanted:g}: the rates may be "
+            f"{MOST_STEPS} times apart at most"
+        )
     ratio = Fraction(wanted / given).limit_denominator(MOST_STEPS)
     return RateChange(up=ratio.numerator, down=ratio.denominator)
