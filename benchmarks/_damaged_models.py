@@ -18,6 +18,7 @@ from diagnose.training.model_files import DESCRIPTION, WEIGHTS, signed_text
 
 Random = np.random.Generator
 HUGE = 10**9
+SIGNED_ANEW = " (signed anew)"
 
 
 def mutate(models: Path, seed: int) -> Mutant:
@@ -26,9 +27,10 @@ def mutate(models: Path, seed: int) -> Mutant:
     name = ASKED[seed % len(ASKED)].name
     family = list(FAMILIES)[seed // len(ASKED) % len(FAMILIES)]
     mutant = FAMILIES[family](models / name, rng)
-    return Mutant(
-        kind=f"{name}: {mutant.kind}", forged=mutant.forged, refused=mutant.refused
-    )
+    kind = f"{name}: {mutant.kind}"
+    if mutant.forged:
+        kind += SIGNED_ANEW
+    return Mutant(kind=kind, forged=mutant.forged, refused=mutant.refused)
 
 
 def forge(folder: Path, content: Any = None) -> None:

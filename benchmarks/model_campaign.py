@@ -18,6 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from benchmarks._damaged_models import SIGNED_ANEW
 from benchmarks._fuzz_judge import verdicts
 from benchmarks._model_judge import work
 from benchmarks._stored_models import make_models
@@ -40,7 +41,9 @@ def main() -> int:
         template = Path(scratch) / "template"
         make_models(template)
         for verdict in verdicts(template, Path(scratch), seeds, work, PATIENCE):
-            outcome = "answered"
+            outcome = "answered as the untouched model"
+            if verdict.kind.endswith(SIGNED_ANEW):
+                outcome = "signed anew, finite answer"
             if verdict.noticed:
                 outcome = "noticed by verify only"
             if verdict.refused:

@@ -1,6 +1,7 @@
 """Networks of remaining lives on disk: evaluate, predict and export agree with the report."""
 
 import json
+import os
 import re
 from dataclasses import replace
 
@@ -51,6 +52,15 @@ def test_every_network_is_stored_without_pickle(life_study, models):
     facts = load_life_model(folders[1])[2]
     assert facts.told == ("speed_rpm", "torque_nm", "life_time_h")
     assert facts.told_range["torque_nm"] == (20.0, 20.0)
+
+
+def test_files_of_a_study_have_the_mode_of_the_umask(life_study):
+    """Models too, which are not written by Python's ``open``."""
+    umask = os.umask(0)
+    os.umask(umask)
+    files = [path for path in life_study.rglob("*") if path.is_file()]
+    assert len(files) > 5
+    assert {path.stat().st_mode & 0o777 for path in files} == {0o666 & ~umask}
 
 
 @pytest.fixture(scope="module")
