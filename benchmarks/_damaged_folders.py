@@ -70,8 +70,9 @@ def forge(folder: Path) -> None:
     manifest = json.loads(path.read_text(encoding="utf-8"))
     for entry in manifest["shards"]:
         shard = folder / "shards" / entry["name"]
-        entry |= {"sha256": sha256_file(shard), "bytes": shard.stat().st_size}
-    manifest["files"] = {name: sha256_file(folder / name) for name in manifest["files"]}
+        if shard.is_file():
+            entry |= {"sha256": sha256_file(shard), "bytes": shard.stat().st_size}
+    manifest["files"] = {name: _digest(folder / name) for name in manifest["files"]}
     path.write_text(json.dumps(manifest), encoding="utf-8")
     forge_checksums(folder)
 
@@ -84,9 +85,16 @@ def forge_checksums(folder: Path) -> None:
         for line in path.read_text(encoding="utf-8").splitlines()
     ]
     path.write_text(
-        "".join(f"{sha256_file(folder / name)}  {name}\n" for name in names),
+        "".join(f"{_digest(folder / name)}  {name}\n" for name in names),
         encoding="utf-8",
     )
+
+
+def _digest(path: Path) -> str:
+    """The sha256 of an ordinary file, and any for what is none."""
+    if not path.is_file():
+        return "0" * 64
+    return sha256_file(path)
 
 
 def _file(folder: Path, rng: np.random.Generator) -> Path:

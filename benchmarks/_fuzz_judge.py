@@ -5,6 +5,7 @@ Every reader is tried, in a process whose death, delay and hunger are seen.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import multiprocessing
 import resource
@@ -29,6 +30,27 @@ TIME_LIMIT = 60.0  # s a mutant, on a machine that does other things too
 MEMORY_LIMIT = 400 * 1024**2  # bytes a mutant may add; the sets are far below 1 MB
 
 
+# What a mutant says of itself, whether anything noticed it, and whether a reader refused it.
+Judged = tuple[str, bool, bool]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Campaign:
+    """Changes of folders by a seed, and what tries each folder then.
+
+    Attributes
+    ----------
+    change : folder and seed -> what was changed
+    judge : folder, mutant, meaning of the unchanged manifest, and a function that tells the
+        watching process what is tried now -> fault, noticed, refused
+    prepare : called once in each process with the unchanged folder
+    """
+
+    change: Callable[[Path, int], Mutant]
+    judge: Callable[[Path, Mutant, dict[str, Any], Callable[[str], None]], Judged]
+    prepare: Callable[[Path], None] | None = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
     """One mutant: ``fault`` is empty where gensig behaved, else what it did.
@@ -44,8 +66,11 @@ class Verdict:
 
 
 def judge(
-    folder: Path, mutant: Mutant, whole: dict[str, Any]
-) -> tuple[str, bool, bool]:
+    folder: Path,
+    mutant: Mutant,
+    whole: dict[str, Any],
+    _tell: Callable[[str], None] = print,
+) -> Judged:
     """The fault ('' for none), whether anything noticed the change, whether a reader refused."""
     lines: list[str] = []
     faults: list[str] = []
@@ -63,7 +88,7 @@ def judge(
     checked = attempt("verify", lambda: lines.extend(verify(folder).problems))
     attempt("verify --quick", lambda: verify(folder, quick=True))
     attempt("inspect", lambda: inspect(folder))
-    read = attempt("read", lambda: _read_all(folder))
+    read = attempt("read", lambda: read_all(folder))
     for path in sorted((folder / "shards").iterdir()):
         attempt("inspect a shard", lambda path=path: inspect(path))
     if any("\n" in line for line in lines):
@@ -81,7 +106,7 @@ def judge(
     return "; ".join(faults), noticed, not read
 
 
-def _read_all(folder: Path) -> None:
+def read_all(folder: Path) -> None:
     with open_dataset(folder, allow_incomplete=True) as data:
         for name in data.column_names:
             values = data.column(name)
@@ -113,64 +138,65 @@ def _meaning(folder: Path) -> dict[str, Any]:
     return {name: value for name, value in content.items() if name in known}
 
 
-Work = Callable[[Path, Path, range, Connection], None]
+def peak_bytes() -> int:
+    """Largest memory of this process since `forget_peak`, or since it began."""
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    line = next(line for line in status.splitlines() if line.startswith("VmHWM"))
+    return int(line.split()[1]) * 1024
 
 
-def _work(template: Path, scratch: Path, seeds: range, pipe: Connection) -> None:
-    whole = _meaning(template)
-    try_mutants(
-        (template, scratch, seeds, pipe),
-        lambda folder, seed: mutate(folder, seed),
-        lambda folder, mutant: judge(folder, mutant, whole),
-    )
+def forget_peak() -> None:
+    """Let the peak begin anew, where the system can."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
 
 
-def try_mutants(
-    given: tuple[Path, Path, range, Connection],
-    mutated: Callable[[Path, int], Mutant],
-    judged: Callable[[Path, Mutant], tuple[str, bool, bool]],
+def _work(
+    template: Path, scratch: Path, seeds: range, pipe: Connection, campaign: Campaign
 ) -> None:
-    """Judge a mutant a seed, and send what came of it through the pipe."""
-    template, scratch, seeds, pipe = given
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    whole = _meaning(template)
+    if campaign.prepare is not None:
+        campaign.prepare(template)
     for seed in seeds:
         folder = scratch / f"mutant-{seed}" / "set"
         shutil.copytree(template, folder)
-        mutant = mutated(folder, seed)
-        pipe.send((seed, mutant.kind, None, False, False))
-        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        fault, noticed, refused = judged(folder, mutant)
-        grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024
-        if grown > MEMORY_LIMIT:
+        mutant = campaign.change(folder, seed)
+
+        def tell(doing: str, seed: int = seed, kind: str = mutant.kind) -> None:
+            pipe.send((seed, f"{kind}{doing}", None, False, False))
+
+        tell("")
+        forget_peak()
+        before = peak_bytes()
+        fault, noticed, refused = campaign.judge(folder, mutant, whole, tell)
+        if (grown := peak_bytes() - before) > MEMORY_LIMIT:
             fault += f"; took {grown} bytes of memory"
         pipe.send((seed, mutant.kind, fault, noticed, refused))
         shutil.rmtree(folder.parent)
 
 
 def verdicts(
-    template: Path,
-    scratch: Path,
-    seeds: range,
-    work: Work = _work,
-    limit: float | None = None,
+    template: Path, scratch: Path, seeds: range, campaign: Campaign | None = None
 ) -> Iterator[Verdict]:
-    """A verdict a seed; ``work`` tries the mutants of some seeds in a process of its own.
+    """A verdict a seed; the campaign is that of accidents where none is given.
 
-    A mutant may take ``limit`` seconds, the first one with the start of the process; None takes
-    `TIME_LIMIT`. A process that dies or hangs is one too, and another takes over behind it.
+    A process that dies or hangs is one too, and another takes over behind it.
     """
     context = multiprocessing.get_context(METHOD)
-    limit = limit or TIME_LIMIT
+    campaign = campaign or Campaign(change=mutate, judge=judge)
     while len(seeds):
         here, there = context.Pipe(duplex=False)
-        worker = context.Process(target=work, args=(template, scratch, seeds, there))
+        worker = context.Process(
+            target=_work, args=(template, scratch, seeds, there, campaign)
+        )
         worker.start()
         there.close()
         seed, kind, fault = seeds[0], "not begun", "died"
         while True:
             try:
-                if not here.poll(limit):
-                    fault = f"hung for {limit:g} s"
+                if not here.poll(TIME_LIMIT):
+                    fault = f"hung for {TIME_LIMIT:g} s"
                     break
                 seed, kind, outcome, noticed, refused = here.recv()
             except EOFError:
@@ -183,7 +209,7 @@ def verdicts(
                     noticed=noticed,
                     refused=refused,
                 )
-                seeds = range(seed + seeds.step, seeds.stop, seeds.step)
+                seeds = range(seed + 1, seeds.stop)
                 if not len(seeds):
                     worker.join()
                     return
@@ -193,4 +219,4 @@ def verdicts(
         yield Verdict(
             seed=seeds[0], kind=kind, fault=fault, noticed=False, refused=False
         )
-        seeds = seeds[1:]
+        seeds = range(seeds[0] + 1, seeds.stop)

@@ -83,7 +83,7 @@ def test_the_judge_sees_harm(tiny, tmp_path, reader, message, monkeypatch):
         _fuzz_judge, "METHOD", "fork"
     )  # the child must know the changes made here
     if reader is not None:
-        monkeypatch.setattr(_fuzz_judge, "_read_all", reader)
+        monkeypatch.setattr(_fuzz_judge, "read_all", reader)
     result = list(verdicts(tiny, tmp_path, range(2)))
     assert [verdict.seed for verdict in result] == [0, 1]
     assert all(message in verdict.fault for verdict in result)
