@@ -47,6 +47,7 @@ WRITING = {
     "finalize": ("finalize", "{set}"),
 }
 READ = "open_dataset"
+VERBS = "GENSIG_FORGED_VERBS"  # variable of the environment: names of the verbs to call
 
 
 def judge(
@@ -66,7 +67,7 @@ def judge(
             verb for verb in ("verify", "inspect", READ, "report") if not statuses[verb]
         ]
         faults += [f"{verb} is silent" for verb in silent]
-    return "; ".join(faults), any(statuses.values()), statuses[READ] != 0
+    return "; ".join(faults), any(statuses.values()), statuses.get(READ) != 0
 
 
 def _calls(folder: Path) -> dict[str, Callable[[], int]]:
@@ -91,7 +92,11 @@ def _calls(folder: Path) -> dict[str, Callable[[], int]]:
     calls = {verb: call(gensig, words) for verb, words in GENSIG.items()}
     calls |= {READ: opened}
     calls |= {verb: call(diagnose, words) for verb, words in DIAGNOSE.items()}
-    return calls | {verb: call(gensig, words) for verb, words in WRITING.items()}
+    calls |= {verb: call(gensig, words) for verb, words in WRITING.items()}
+    chosen = os.environ.get(VERBS)
+    if not chosen:
+        return calls
+    return {verb: calls[verb] for verb in chosen.split(",")}
 
 
 def _status(verb: str, call: Callable[[], int], faults: list[str]) -> int:

@@ -27,6 +27,7 @@ from gensig.errors import DatasetError
 
 METHOD = "spawn"
 TIME_LIMIT = 60.0  # s a mutant, on a machine that does other things too
+PREPARE_LIMIT = 600.0  # s until a process has compiled what it needs
 MEMORY_LIMIT = 400 * 1024**2  # bytes a mutant may add; the sets are far below 1 MB
 
 
@@ -193,12 +194,14 @@ def verdicts(
         worker.start()
         there.close()
         seed, kind, fault = seeds[0], "not begun", "died"
+        limit = TIME_LIMIT if campaign.prepare is None else PREPARE_LIMIT
         while True:
             try:
-                if not here.poll(TIME_LIMIT):
-                    fault = f"hung for {TIME_LIMIT:g} s"
+                if not here.poll(limit):
+                    fault = f"hung for {limit:g} s"
                     break
                 seed, kind, outcome, noticed, refused = here.recv()
+                limit = TIME_LIMIT
             except EOFError:
                 break
             if outcome is not None:

@@ -21,6 +21,7 @@ from diagnose.studies.result_files import Content, Entry, sha256
 from gensig.dataset.folder.layout import PLAN, SPLITS
 from gensig.errors import ConfigError, DatasetError
 from gensig.text.csv_tables import read_rows
+from gensig.text.user_file import open_table
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
@@ -214,15 +215,8 @@ def _labels(
 
 def _rows(path: Path) -> list[dict[str, str]]:
     """Rows of the file; refuses one that is no CSV with the required columns."""
-    if path.exists() and not path.is_file():
-        raise DatasetError(f"{path} is no ordinary file; give a CSV file")
-    if path.is_file() and path.stat().st_size > LARGEST_FILE:
-        size = path.stat().st_size
-        raise DatasetError(
-            f"{path} has {size} bytes, and at most {LARGEST_FILE} are read"
-        )
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
+        with open_table(str(path), path, most_bytes=LARGEST_FILE) as file:
             names, *cells = [row for row in read_rows(file) if row] or [[]]
     except (UnicodeDecodeError, csv.Error) as error:
         raise DatasetError(f"{path} is no CSV file in UTF-8: {error}") from None

@@ -9,15 +9,14 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping, Sequence
-from io import BufferedReader
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dataset.storage.atomic import (
-    open_ordinary,
+    open_part,
     refuse_larger,
     write_bytes,
     write_text,
@@ -228,7 +227,7 @@ def altered_text(path: Path) -> str:
     return f"{path} was altered: its sha256 is not the one in {DESCRIPTION}; restore it from a copy"
 
 
-def _check_size(path: Path, file: BufferedReader, recorded: int) -> None:
+def _check_size(path: Path, file: BinaryIO, recorded: int) -> None:
     size = file.seek(0, 2)
     file.seek(0)
     if size != recorded:
@@ -238,7 +237,7 @@ def _check_size(path: Path, file: BufferedReader, recorded: int) -> None:
         )
 
 
-def _kinds(path: Path, file: BufferedReader) -> dict[str, Kind]:
+def _kinds(path: Path, file: BinaryIO) -> dict[str, Kind]:
     """Type and shape of every tensor, from the header, whose promise the file must keep."""
     size = file.seek(0, 2)
     file.seek(0)
@@ -320,10 +319,10 @@ def _kind_text(kind: Kind) -> str:
     return f"{dtype} ({', '.join(map(str, shape))[:80]})"
 
 
-def _opened(path: Path, limit: int) -> BufferedReader:
+def _opened(path: Path, limit: int) -> BinaryIO:
     """An ordinary file of a model folder, of at most so many bytes."""
     try:
-        file = open_ordinary(path, part_of=MODEL)
+        file = open_part(path, part_of=MODEL)
     except OSError as error:
         raise DatasetError(
             f"{path} cannot be read: {error.strerror}; check its permissions"

@@ -12,12 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dataset.columns import COLUMNS, IS_REFERENCE
+from gensig.dataset.folder.layout import PLAN_BYTES_LIMIT
 from gensig.dataset.schema import kind_of
 from gensig.dataset.storage.atomic import read_text, require_digest
 from gensig.errors import DatasetError
 from gensig.text.csv_tables import read_rows, write_rows
 
-PLAN_BYTES_LIMIT = 4 * 1024**3
+COLUMNS_LIMIT = 5000
+# bytes of a column as an array of text over its characters, and what it may take in any case
+WIDENING_LIMIT, TEXT_BYTES_FREE = 400, 256 * 1024**2
+BYTES_A_CHARACTER = 4  # of numpy
 
 _INT = re.compile(r"[+-]?[0-9]{1,19}")
 _FLOAT = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?([eE][+-]?[0-9]+)?|nan|inf)")
@@ -225,6 +229,11 @@ def read_plan(path: Path, *, sha256: str | None = None) -> Plan:
         raise DatasetError(
             f"{path} is no CSV table ({error}); restore it from a copy"
         ) from error
+    if len(header) > COLUMNS_LIMIT:
+        raise DatasetError(
+            f"{path} has {len(header)} columns, at most {COLUMNS_LIMIT} are possible; it is no "
+            "plan of gensig"
+        )
     if len(set(header)) != len(header):
         raise DatasetError(
             f"{path} has two columns of the same name; restore it from a copy"
@@ -307,10 +316,22 @@ def _infer(cells: tuple[str, ...] | list[str]) -> str:
     return "float" if all(_FLOAT.fullmatch(cell) for cell in cells) else "str"
 
 
+def _texts(name: str, cells: tuple[str, ...]) -> np.ndarray:
+    """Cells as an array of text, whose longest one decides the bytes of each."""
+    lengths = list(map(len, cells))
+    n_bytes = BYTES_A_CHARACTER * max(lengths, default=0) * len(cells)
+    if n_bytes > max(TEXT_BYTES_FREE, WIDENING_LIMIT * sum(lengths)):
+        raise DatasetError(
+            f"column {name[:80]} holds a text of {max(lengths)} characters, which would take "
+            f"{n_bytes} bytes in {len(cells)} records; shorten it"
+        )
+    return np.array(cells, dtype=str)
+
+
 def _parsed(name: str, cells: tuple[str, ...]) -> np.ndarray:
     kind = kind_of(name) or _infer(cells)
     if kind == "str":
-        return np.array(cells, dtype=str)
+        return _texts(name, cells)
     pattern = {"int": _INT, "float": _FLOAT}[kind]
     for cell in cells:
         if not pattern.fullmatch(cell):

@@ -34,7 +34,9 @@ from gensig.dataset.storage.guard import (
     datasets,
     first_line,
     read_rows,
+    unknown_class,
 )
+from gensig.dataset.storage.index_check import quick_index_problem
 from gensig.dataset.storage.quantization import read_signal
 from gensig.errors import DatasetError
 
@@ -89,7 +91,9 @@ def open_dataset(
         n_more = len(problems) - 1
         more = f" and {n_more} more" if n_more else ""
         raise DatasetError(f"{folder} is NOT whole: {problems[0]}{more}")
-    return Dataset(folder, manifest)
+    data = Dataset(folder, manifest)
+    data.check_index()
+    return data
 
 
 class Dataset:
@@ -242,7 +246,23 @@ class Dataset:
             raise self._shards.unreadable(shard, first_line(error)) from error
         if values.shape[1:] != shape:
             raise self._another_shape(shard, name)
+        if name == "label" and (problem := unknown_class(values, self.class_names)):
+            raise self._shards.unreadable(shard, problem)
         return values
+
+    def check_index(self) -> None:
+        """Raise DatasetError for an index that is not one over the shards; it is not read.
+
+        That of a set with very many shards is left to `gensig verify`.
+        """
+        first = next(
+            index
+            for index, entry in enumerate(self.manifest.shards)
+            if entry.state == "done"
+        )
+        shard = self._shards.open(first)
+        if problem := quick_index_problem(self.folder, self.manifest, shard):
+            raise DatasetError(f"{problem}; run `gensig verify {self.folder}`")
 
     def first_record(self, shard: int) -> int:
         """Number of the record in row 0 of a shard."""
@@ -405,7 +425,10 @@ class Dataset:
         """
         if protocol in self.protocols:
             name = f"{SPLITS}/{protocol}.csv"
-            return read_split(self.folder / name, sha256=self.manifest.files[name])
+            digest = self.manifest.files[name]
+            return read_split(
+                self.folder / name, n_records=self.n_records, sha256=digest
+            )
         if protocol in PROTOCOLS:
             raise DatasetError(
                 f"split {protocol!r} does not exist in {self.folder}; {self.left_out[protocol]}"

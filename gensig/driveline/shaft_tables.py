@@ -16,7 +16,7 @@ from pathlib import Path
 
 from gensig.errors import ConfigError
 from gensig.text.csv_tables import read_rows
-from gensig.text.user_file import check_file
+from gensig.text.user_file import open_table
 from gensig.units import UNITS, split_unit, to_si
 
 EDGE_KINDS = ("shaft", "coupling", "rigid", "gear_mesh")
@@ -161,8 +161,8 @@ def _text_of(key: str, file: str) -> str:
         return str(_tables().joinpath(bare).read_text(encoding="utf-8"))
     try:
         path = Path(file).expanduser()
-        check_file(f"{key} = {file}", path)
-        return path.read_text(encoding="utf-8-sig")
+        with open_table(f"{key} = {file}", path) as stream:
+            return stream.read()
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", "it is no text in UTF-8")
         raise ConfigError(

@@ -18,6 +18,7 @@ from gensig.measured.set_facts import (
     shipped_names,
     user_facts,
 )
+from gensig.text.ordinary_file import open_ordinary
 
 MOST_FILES = 50_000  # of a folder
 MOST_OTHERS = 12  # that are named
@@ -237,7 +238,7 @@ def _files_below(root: Path) -> Iterator[Path]:
 def _sha256(path: Path) -> str:
     digest = hashlib.sha256()
     try:
-        with path.open("rb") as stream:
+        with open_ordinary(path) as stream:
             while part := stream.read(HASHED_AT_ONCE):
                 digest.update(part)
     except OSError as error:

@@ -6,7 +6,6 @@ The files may come from anybody. Nothing is composed of a file that a check refu
 from __future__ import annotations
 
 import re
-import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from gensig.options.references import (
     check_text,
     shortened,
 )
+from gensig.text.ordinary_file import is_refused, open_ordinary
 
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 MOST_BYTES = 1_000_000
@@ -50,16 +50,16 @@ def option_text(path: Path, folder: Path) -> str:
             raise ConfigError(
                 f"{path} leads out of {folder}; option files must lie in the folder itself"
             )
-        facts = path.stat()
-        if not stat.S_ISREG(facts.st_mode):
-            raise ConfigError(f"{path} is no file; remove it from {folder}")
-        if facts.st_size > MOST_BYTES:
+        with open_ordinary(path) as stream:
+            content = stream.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
             raise ConfigError(
                 f"{path} is larger than {MOST_BYTES // 1_000_000} MB; it is no option file"
             )
-        with path.open("rb") as stream:
-            return stream.read(MOST_BYTES).decode("utf-8")
+        return content.decode("utf-8")
     except OSError as error:
+        if is_refused(error) or isinstance(error, IsADirectoryError):
+            raise ConfigError(f"{path} is no file; remove it from {folder}") from None
         raise ConfigError(f"{path} cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise ConfigError(

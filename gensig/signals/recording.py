@@ -6,6 +6,7 @@ Every mistake is answered by one line.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from gensig.errors import ConfigError
 from gensig.signals.reading.reader_process import limits_for, read_apart
 from gensig.signals.reading.recording_files import LEAST_SAMPLES, Content
-from gensig.text.user_file import check_rate
+from gensig.text.user_file import check_rate, open_given
 
 Array = NDArray[np.float64]
 
@@ -219,10 +220,8 @@ def _content(file: str, suffix: str, array: str | None) -> Content:
     """Content of a file, from the process that reads it."""
     path = Path(file).expanduser()
     try:
-        n_bytes = path.stat().st_size
-        if not path.is_file() and not path.is_dir():
-            raise ConfigError(f"{file} cannot be read: it is no file; save it as one")
-        path.open("rb").close()
+        with open_given(file, path) as stream:
+            n_bytes = os.fstat(stream.fileno()).st_size
     except OSError as error:
         raise ConfigError(f"{file} cannot be read: {error.strerror}") from None
     reader = f"{READER_MODULE}:{READERS[suffix]}"

@@ -6,16 +6,18 @@ Every mistake is one line.
 from __future__ import annotations
 
 import csv
+import io
 import math
-import stat
+import os
 from pathlib import Path
-from typing import TextIO
+from typing import BinaryIO, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
 from gensig.text.csv_tables import read_rows
+from gensig.text.ordinary_file import is_refused, open_ordinary
 
 Array = NDArray[np.float64]
 
@@ -33,8 +35,7 @@ def read_table(key: str, file: str, *, least_rows: int) -> tuple[list[str], Arra
     path = Path(file).expanduser()
     where = f"{key} = {file}"
     try:
-        check_file(where, path)
-        with path.open(newline="", encoding="utf-8-sig") as stream:
+        with open_table(where, path) as stream:
             names = _header(where, stream)
             values = np.loadtxt(stream, delimiter=",", ndmin=2, dtype=np.float64)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
@@ -61,25 +62,50 @@ def read_table(key: str, file: str, *, least_rows: int) -> tuple[list[str], Arra
     return names, np.ascontiguousarray(values.T)
 
 
-def check_file(where: str, path: Path) -> None:
-    """Refuse what has no end, such as a device, and a file that is too large.
+def open_table(
+    where: str, path: Path, *, errors: str = "strict", most_bytes: int | None = None
+) -> TextIO:
+    """A text file in UTF-8 of moderate size, open for reading.
 
     Parameters
     ----------
     where : the key and the file, in messages
     path : the file
+    errors : as of ``open``
+    most_bytes : of the file; None is `MOST_BYTES`
 
     Raises
     ------
-    ConfigError    for anything but a file of moderate size; OSError for a file that is not there
+    ConfigError    for what is no ordinary file, such as a pipe or a device, and a file that is
+                   too large
+    OSError    for a file that cannot be opened
     """
-    facts = path.stat()
-    if not stat.S_ISREG(facts.st_mode) and not path.is_dir():
-        raise ConfigError(f"{where} cannot be read: it is no file; save it as one")
-    if facts.st_size > MOST_BYTES:
+    most_bytes = most_bytes or MOST_BYTES
+    stream = open_given(where, path)
+    if os.fstat(stream.fileno()).st_size > most_bytes:
+        stream.close()
         raise ConfigError(
-            f"{where} is larger than {MOST_BYTES // 1_000_000} MB; cut it"
+            f"{where} is larger than {most_bytes // 1_000_000} MB; cut it"
         )
+    return io.TextIOWrapper(stream, encoding="utf-8-sig", errors=errors)
+
+
+def open_given(where: str, path: Path) -> BinaryIO:
+    """A file that a user named, open for reading.
+
+    Raises
+    ------
+    ConfigError    for a pipe, a socket or a device
+    OSError    for a file that cannot be opened
+    """
+    try:
+        return open_ordinary(path)
+    except OSError as error:
+        if not is_refused(error):
+            raise
+        raise ConfigError(
+            f"{where} cannot be read: it is no file; save it as one"
+        ) from None
 
 
 def _header(where: str, stream: TextIO) -> list[str]:

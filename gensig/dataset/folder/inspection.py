@@ -7,6 +7,7 @@ import numpy as np
 
 from gensig.dataset.cards.facts import gear_facts, value_range
 from gensig.dataset.folder.layout import MANIFEST, Manifest, read_manifest
+from gensig.dataset.folder.quick_check import check_opening
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.dataset.storage.attributes import HDF5_ERRORS, read_attributes
 from gensig.dataset.storage.guard import holds_its_data, open_file
@@ -43,6 +44,7 @@ def inspect(path: Path) -> str:
 
 def _folder(folder: Path) -> str:
     manifest = read_manifest(folder)
+    check_opening(folder, manifest)
     name = _show(folder)
     version = f"format version {manifest.schema_version}"
     lines = [f"{name}: data set, {version}, {manifest.state}"]

@@ -13,7 +13,7 @@ from gensig.dataset.folder.layout import (
     read_manifest,
 )
 from gensig.dataset.folder.manifest import differing_keys, identity_hash
-from gensig.dataset.storage.atomic import sha256_file
+from gensig.dataset.folder.quick_check import plan_problem
 from gensig.dataset.storage.compression import creation_options
 from gensig.errors import DatasetError
 from gensig.version import __version__
@@ -40,10 +40,10 @@ def joined_folder(
         raise DatasetError(
             f"{out / PLAN} is missing; `gensig resume {out}` makes it again"
         )
-    if manifest.files.get(PLAN) != sha256_file(out / PLAN):
+    if problem := plan_problem(out, manifest):
         raise DatasetError(
-            f"{out / PLAN} was changed since the folder was begun; restore it, or start a new "
-            "folder"
+            f"{out}: {problem}; the plan was changed since the folder was begun: restore it, or "
+            "start a new folder"
         )
     return manifest, config
 

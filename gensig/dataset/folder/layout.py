@@ -43,7 +43,13 @@ NAMES = (
 )
 PARTS = (SHARDS, SPLITS, FIGURES)  # folders
 
-TEXT_BYTES_LIMIT = 256 * 1024**2
+# manifest and SHA256SUMS: 64 MiB are some 300,000 shards
+TEXT_BYTES_LIMIT = 64 * 1024**2
+PLAN_BYTES_LIMIT = 4 * 1024**3
+# a row of a plan has at least an id, a shard and a row number: "a,0,0\n"
+RECORDS_LIMIT = PLAN_BYTES_LIMIT // 6
+FILES_LIMIT = 1000  # that the manifest lists beside the shards
+COUNT_LIMIT = 2**63 - 1  # what fits numpy's integers
 CONFIG_BYTES_LIMIT = 1024**2
 CONFIG_DEPTH_LIMIT = 50
 
@@ -200,13 +206,18 @@ def read_manifest(folder: Path) -> Manifest:
             )
         entries = enumerate(_get(content, "shards", list))
         files = _get(content, "files", dict)
+        if len(files) > FILES_LIMIT:
+            raise DatasetError(
+                f"it lists {len(files)} files beside the shards, at most {FILES_LIMIT} are "
+                "possible; it is damaged or forged"
+            )
         state = _get(content, "state", str)
         manifest = Manifest(
             schema_version=version,
             generator_version=_get(content, "generator_version", str),
             identity=_hash(_get(content, "identity", str), "identity"),
             seed=_get(content, "seed", int),
-            n_records=_get(content, "n_records", int),
+            n_records=_count(content, "n_records", RECORDS_LIMIT),
             state=_choice(state, ("incomplete", "complete"), "state"),
             shards=tuple(shard_entry(i, entry) for i, entry in entries),
             files={name: _hash(value, name) for name, value in files.items()},
@@ -252,6 +263,16 @@ def _get(content: Any, key: str, kind: type) -> Any:
     return value
 
 
+def _count(content: Any, key: str, limit: int = COUNT_LIMIT) -> int:
+    value: int = _get(content, key, int)
+    if value > limit:
+        raise DatasetError(
+            f"'{key}' is {str(value)[:30]}, at most {limit} is possible; the manifest is damaged "
+            "or forged"
+        )
+    return value
+
+
 def _hash(value: Any, name: str) -> str:
     if not isinstance(value, str) or not _HASH.fullmatch(value):
         raise DatasetError(
@@ -281,11 +302,11 @@ def shard_entry(index: int, content: Any) -> ShardEntry:
     digest = _get(content, "sha256", str)
     entry = ShardEntry(
         name=name,
-        rows=_get(content, "rows", int),
+        rows=_count(content, "rows", RECORDS_LIMIT),
         state=state,
         sha256=_hash(digest, name) if state == "done" else "",
-        bytes=_get(content, "bytes", int),
-        n_failed=_get(content, "n_failed", int),
+        bytes=_count(content, "bytes"),
+        n_failed=_count(content, "n_failed"),
     )
     if entry.rows == 0 or entry.n_failed > entry.rows:
         raise DatasetError(

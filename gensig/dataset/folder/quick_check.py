@@ -1,5 +1,6 @@
 """Checks of a data set that read no record: names, sizes, and what a shard says of itself."""
 
+import hashlib
 import stat
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,6 +21,9 @@ from gensig.dataset.schema import IDENTITY, SHARD_INDEX
 from gensig.dataset.storage.atomic import sha256_file
 from gensig.dataset.storage.checksums import differences, read_checksums
 from gensig.errors import DatasetError
+from gensig.text.ordinary_file import open_ordinary
+
+READ_AT_ONCE = 1024**2  # bytes
 
 
 def check_opening(folder: Path, manifest: Manifest) -> None:
@@ -33,12 +37,46 @@ def check_opening(folder: Path, manifest: Manifest) -> None:
     DatasetError    for the first difference
     """
     problems = unlisted_files(manifest) or _altered_manifest(folder, manifest)
-    if not problems and _digest(folder / PLAN) != manifest.files[PLAN]:
-        problems = [f"{PLAN} is missing or was altered"]
+    if not problems and (problem := plan_problem(folder, manifest)):
+        problems = [problem]
     if not problems:
         problems = shard_sizes(folder, manifest)
     if problems:
         raise DatasetError(f"{folder}: {problems[0]}; run `gensig verify {folder}`")
+
+
+def plan_problem(folder: Path, manifest: Manifest) -> str:
+    """One line on a plan of another sha256 or number of records than the manifest says.
+
+    '' for none. No count of a manifest decides what is allocated before the plan has so many rows.
+    """
+    digest, n_records = plan_digest(folder)
+    if not digest or digest != manifest.files.get(PLAN):
+        return f"{PLAN} is missing or was altered"
+    return records_problem(n_records, manifest)
+
+
+def records_problem(n_records: int, manifest: Manifest) -> str:
+    """One line on a plan that has another number of records than the manifest; '' for none."""
+    if n_records == manifest.n_records:
+        return ""
+    return f"{PLAN} has {n_records} records and the manifest {manifest.n_records}; one was altered"
+
+
+def plan_digest(folder: Path) -> tuple[str, int]:
+    """The sha256 of the plan and the number of its records; '' and 0 where there is none.
+
+    No cell of a plan holds a line break, so that lines are records.
+    """
+    digest, n_lines = hashlib.sha256(), 0
+    try:
+        with open_ordinary(folder / PLAN, follow_links=False) as file:
+            while part := file.read(READ_AT_ONCE):
+                digest.update(part)
+                n_lines += part.count(b"\n")
+    except OSError:
+        return "", 0
+    return digest.hexdigest(), n_lines - 1
 
 
 def unlisted_files(manifest: Manifest) -> list[str]:

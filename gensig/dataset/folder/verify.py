@@ -9,6 +9,7 @@ import numpy as np
 from gensig.dataset.columns import COLUMNS
 from gensig.dataset.folder.layout import (
     CONFIG,
+    INDEX,
     MANIFEST,
     PLAN,
     SHARDS,
@@ -21,6 +22,8 @@ from gensig.dataset.folder.layout import (
 from gensig.dataset.folder.manifest import file_digests, identity_hash
 from gensig.dataset.folder.quick_check import (
     label_problem,
+    plan_digest,
+    records_problem,
     size_problem,
     unlisted_files,
 )
@@ -37,7 +40,9 @@ from gensig.dataset.storage.guard import (
     open_shard,
     read_rows,
     shard_labels,
+    unknown_class,
 )
+from gensig.dataset.storage.index_check import index_problem
 from gensig.dataset.storage.quantization import is_scale, read_signal
 from gensig.errors import DatasetError
 
@@ -93,6 +98,10 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
 
 def damage(folder: Path, manifest: Manifest, *, quick: bool = False) -> list[str]:
     """Problems of a data set as far as it is made, one line each; see `verify`."""
+    n_planned = plan_digest(folder)[1]
+    if 0 < n_planned < len(manifest.shards):
+        # each shard holds a record: the manifest was made up, and its shards are not looked for
+        return [records_problem(n_planned, manifest)]
     problems = _file_names(folder, manifest) + _extra_files(folder, manifest)
     if manifest.is_complete:
         problems += [
@@ -118,7 +127,9 @@ def damage(folder: Path, manifest: Manifest, *, quick: bool = False) -> list[str
             with open_shard(path, folder=folder) as file:
                 if not differing:
                     problems += _label_differs(file, entry, manifest, i)
-                    reference = reference or _description(file, path)
+                    if reference is None:
+                        reference = _description(file, path)
+                        problems += _index(folder, manifest, file)
                     problems += _description_differs(file, path, reference)
                 lines = _rows_differ(file, entry, plan, int(starts[i]))
                 # A damaged file can have thousands of wrong rows: one line is enough.
@@ -225,7 +236,8 @@ def _splits(folder: Path, manifest: Manifest, plan: Plan) -> list[str]:
         if path.parent.name != SPLITS or not path.is_file():
             continue
         try:
-            lines = split_problems(path.stem, read_split(path), plan)
+            table = read_split(path, n_records=plan.n_records)
+            lines = split_problems(path.stem, table, plan)
             problems += [f"{SPLITS}/{line}" for line in lines]
         except DatasetError as error:
             problems.append(str(error))
@@ -277,12 +289,23 @@ def _description_differs(file: h5py.File, path: Path, reference: dict) -> list[s
     return problems
 
 
+def _index(folder: Path, manifest: Manifest, shard: h5py.File) -> list[str]:
+    """The first reason why the index is not the one over the shards, where there is one."""
+    if not manifest.is_complete or not (folder / INDEX).exists():
+        return []
+    problem = index_problem(folder, manifest, shard)
+    return [problem] if problem else []
+
+
 def _label_differs(
     file: h5py.File, entry: ShardEntry, manifest: Manifest, index: int
 ) -> list[str]:
     problem = label_problem(shard_labels(file), manifest, index)
     if problem:
         return [f"{entry.name} {problem}"]
+    classes = read_attributes(file)["class_names"]
+    if problem := unknown_class(read_rows(file["label"]), classes):
+        return [f"{entry.name}: {problem}"]
     return []
 
 

@@ -8,12 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from gensig.dataset.folder.layout import TEXT_BYTES_LIMIT
+from gensig.dataset.columns import COLUMNS
+from gensig.dataset.folder.layout import RECORDS_LIMIT
 from gensig.dataset.storage.atomic import read_text, require_digest
 from gensig.errors import DatasetError
 from gensig.text.csv_tables import read_rows, write_rows
 
 SUBSETS = ("train", "validation", "test")
+SPLIT_BYTES_LIMIT = 1024**3
+PARTS_LIMIT, PART_BYTES = 64, 128  # of a record; of a row that names one
+LONGEST_ID = COLUMNS["record_id"].n_bytes
 HEADER = ("record_id", "start_fraction", "stop_fraction", "subset")
 
 
@@ -45,12 +49,18 @@ class SplitTable:
         return zip(*columns, strict=True)
 
 
-def read_split(path: Path, *, sha256: str | None = None) -> SplitTable:
+def read_split(
+    path: Path, *, n_records: int = RECORDS_LIMIT, sha256: str | None = None
+) -> SplitTable:
     """Read one `splits/<protocol>.csv`; DatasetError names the file and what is wrong with it.
 
-    With ``sha256``, a file of another digest is refused.
+    Parameters
+    ----------
+    n_records : of the plan; bounds what is read, 64 parts a record and never over 1 GiB
+    sha256 : a file of another digest is refused
     """
-    text = read_text(path, limit=TEXT_BYTES_LIMIT * 4)
+    most = PART_BYTES * (1 + PARTS_LIMIT * n_records)
+    text = read_text(path, limit=min(most, SPLIT_BYTES_LIMIT))
     if sha256 is not None:
         require_digest(path, text, sha256)
     try:
@@ -60,6 +70,8 @@ def read_split(path: Path, *, sha256: str | None = None) -> SplitTable:
                 f"header is {','.join(header)[:80]}, expected {','.join(HEADER)}"
             )
         ids, starts, stops, subsets = zip(*rows, strict=True)
+        if longest := max(ids, key=len)[LONGEST_ID:]:
+            raise ValueError(f"a record_id has {LONGEST_ID + len(longest)} characters")
         start, stop = np.array(starts, dtype=float), np.array(stops, dtype=float)
         if not ((start >= 0) & (start < stop) & (stop <= 1)).all():
             raise ValueError("fractions must be 0 <= start < stop <= 1")

@@ -5,13 +5,13 @@ import fcntl
 import hashlib
 import os
 import secrets
-import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from io import BufferedReader
 from pathlib import Path
+from typing import BinaryIO
 
 from gensig.errors import DatasetError, WriteError
+from gensig.text.ordinary_file import is_refused, open_ordinary
 
 TEMPORARY_SUFFIX = ".tmp"
 INSTEAD = "choose another out=DIR"  # remedy that helps whatever the disk says
@@ -198,17 +198,15 @@ def read_text(path: Path, *, limit: int, follow_links: bool = False) -> str:
 
 def _ordinary_bytes(path: Path, *, limit: int, follow_links: bool) -> bytes:
     """Bytes of an ordinary file of at most so many."""
-    with open_ordinary(path, follow_links=follow_links) as file:
+    with open_part(path, follow_links=follow_links) as file:
         refuse_larger(path, file, limit)
-        return file.read()
+        return file.read(limit)
 
 
-def open_ordinary(
+def open_part(
     path: Path, *, follow_links: bool = False, part_of: str = DATA_SET
-) -> BufferedReader:
-    """An ordinary file of a stranger, open for reading; never waits.
-
-    The type is asked of what was opened, not of its name.
+) -> BinaryIO:
+    """An ordinary file of a stranger's folder, open for reading; never waits.
 
     Parameters
     ----------
@@ -221,25 +219,19 @@ def open_ordinary(
     DatasetError    when it is absent, a link, a folder, a pipe or a device
     OSError         when the system refuses
     """
-    flags = os.O_RDONLY | os.O_NONBLOCK  # a named pipe must not hang
-    if not follow_links:
-        flags |= os.O_NOFOLLOW
     try:
-        descriptor = os.open(path, flags)
+        return open_ordinary(path, follow_links=follow_links)
     except OSError as error:
         if error.errno == errno.ELOOP:
             raise DatasetError(link_text(path, part_of)) from error
-        if error.errno in (errno.ENOENT, errno.ENOTDIR, errno.ENXIO):
+        absent = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR)
+        if error.errno in absent or is_refused(error):
             raise _no_file(path, part_of) from error
         raise
-    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-        os.close(descriptor)
-        raise _no_file(path, part_of)
-    return os.fdopen(descriptor, "rb")
 
 
 def refuse_larger(
-    path: Path, file: BufferedReader, limit: int, part_of: str = DATA_SET
+    path: Path, file: BinaryIO, limit: int, part_of: str = DATA_SET
 ) -> None:
     """Raise DatasetError for an open file of more bytes than a limit."""
     size = os.fstat(file.fileno()).st_size
@@ -274,6 +266,6 @@ def require_digest(path: Path, text: str, sha256: str) -> None:
 
 
 def sha256_file(path: Path) -> str:
-    """Hexadecimal sha256 of a file's bytes."""
-    with path.open("rb") as file:
+    """Hexadecimal sha256 of an ordinary file's bytes; OSError for anything else."""
+    with open_ordinary(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,5 +1,6 @@
 """HDF5 attributes of fixed size: text, numbers and lists of them go in and come back the same."""
 
+import math
 from collections.abc import Sequence
 
 import h5py
@@ -63,18 +64,38 @@ def _text_array(texts: list[str], name: str) -> np.ndarray:
 
 
 def read_attributes(target: h5py.HLObject) -> dict:
-    """Attributes as text, int, float or lists of them; those of any other type are left out."""
+    """Attributes as text, int, float or lists of them.
+
+    Those of any other type are left out, and so are those larger than `set_attribute` writes.
+    """
     attributes: dict = {}
     for name in target.attrs:
-        # A damaged name comes as bytes.
-        kind = target.attrs.get_id(name).dtype.kind if isinstance(name, str) else ""
-        if kind not in ("S", "i", "u", "f"):
+        if not isinstance(name, str):  # a damaged name comes as bytes
+            continue
+        stored = target.attrs.get_id(name)
+        kind = stored.dtype.kind
+        if kind not in ("S", "i", "u", "f") or _n_bytes(stored) > ATTRIBUTE_BYTES_LIMIT:
             continue
         value = np.asarray(target.attrs[name])
         if kind == "S" or value.dtype.kind == "O":
             value = decoded(value)
         attributes[name] = value.tolist()
     return attributes
+
+
+def oversized_attributes(target: h5py.HLObject) -> list[str]:
+    """Names of attributes that `read_attributes` leaves out because they are too large."""
+    return [
+        name
+        for name in target.attrs
+        if isinstance(name, str)
+        and _n_bytes(target.attrs.get_id(name)) > ATTRIBUTE_BYTES_LIMIT
+    ]
+
+
+def _n_bytes(stored: h5py.h5a.AttrID) -> int:
+    """Bytes of an attribute's values, by its shape and type."""
+    return math.prod(stored.shape or (1,)) * stored.dtype.itemsize
 
 
 def decoded(values: np.ndarray) -> np.ndarray:

@@ -16,6 +16,8 @@ BLOSC2_FILTER = 32026
 # Blosc2 stores a constant chunk in some 260 bytes, so that the size of a chunk says nothing about
 # what is stored.
 BLOSC2_CHUNK_LIMIT = 256 * 1024**2
+# what one record, or a whole column, may take after decompression
+COMPRESSED_LIMIT = 512 * 1024**2
 
 _NAMES = {
     h5py.h5z.FILTER_DEFLATE: "gzip",

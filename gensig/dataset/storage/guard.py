@@ -1,6 +1,7 @@
 """Opening of shards from unknown sources, with a check before anything is read."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import h5py
@@ -16,10 +17,18 @@ from gensig.dataset.schema import (
     known_column,
 )
 from gensig.dataset.storage.atomic import link_text
-from gensig.dataset.storage.attributes import HDF5_ERRORS, decoded, read_attributes
+from gensig.dataset.storage.attribute_check import attribute_problem
+from gensig.dataset.storage.attributes import (
+    ATTRIBUTE_BYTES_LIMIT,
+    HDF5_ERRORS,
+    decoded,
+    oversized_attributes,
+    read_attributes,
+)
 from gensig.dataset.storage.compression import (
     BLOSC2_CHUNK_LIMIT,
     BLOSC2_FILTER,
+    COMPRESSED_LIMIT,
     filters,
     load_blosc2,
 )
@@ -29,6 +38,8 @@ from gensig.errors import DatasetError
 # never written.
 EXPANSION_LIMIT = 1100
 ATTRIBUTES_LIMIT = 1000
+DATASETS_LIMIT = 10_000
+UNIT_BYTES_LIMIT = 100
 
 _FILTERS = {
     h5py.h5z.FILTER_DEFLATE,
@@ -92,8 +103,8 @@ def check_shard(file: h5py.File, path: Path) -> None:
     ------
     DatasetError    for soft or external links, types that are no plain numbers or text, data
                     outside the file, filters other than gzip, lzf and blosc2, shapes larger than
-                    what is stored, missing columns, unequal row counts, blosc2 without the package
-                    that reads it
+                    what is stored, missing columns, unequal row counts, attributes of another
+                    kind or length, blosc2 without the package that reads it
     """
     try:
         contents = datasets(file, path)
@@ -105,9 +116,14 @@ def check_shard(file: h5py.File, path: Path) -> None:
         n_records = row_count(contents["record_id"])
         for name, data in contents.items():
             _check_dataset(name, data, n_records, path)
+        if 0 in contents["acceleration"].shape:
+            raise DatasetError(
+                f"{path}: acceleration has shape {contents['acceleration'].shape}; a record has "
+                "at least one channel and one sample"
+            )
         for name, scale in SCALES.items():
             _check_scale(contents, name, scale, path)
-        _check_attributes(file, path)
+        _check_attributes(file, contents, path)
     except HDF5_ERRORS as error:
         raise DatasetError(
             f"{path} is damaged ({first_line(error)}); restore it from a copy"
@@ -129,7 +145,11 @@ def datasets(file: h5py.File, path: Path) -> dict[str, h5py.Dataset]:
                 )
             if group.id.links.get_info(key.encode()).type != h5py.h5l.TYPE_HARD:
                 raise DatasetError(
-                    f"{path}: '{_plain(prefix + key)}' is a link; a shard holds its own data only"
+                    f"{path}: '{shown(prefix + key)}' is a link; a shard holds its own data only"
+                )
+            if len(contents) >= DATASETS_LIMIT:
+                raise DatasetError(
+                    f"{path} has more than {DATASETS_LIMIT} data sets; it is no gensig shard"
                 )
             item = group[key]
             if isinstance(item, h5py.Dataset):
@@ -138,7 +158,7 @@ def datasets(file: h5py.File, path: Path) -> dict[str, h5py.Dataset]:
                 collect(item, f"{prefix}{key}/", deeper=False)
             else:
                 raise DatasetError(
-                    f"{path}: '{_plain(prefix + key)}' is neither a data set nor a group of data "
+                    f"{path}: '{shown(prefix + key)}' is neither a data set nor a group of data "
                     "sets"
                 )
 
@@ -152,7 +172,7 @@ def row_count(data: h5py.Dataset) -> int:
 
 
 def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) -> None:
-    label = f"{path}: data set '{_plain(name)}'"
+    label = f"{path}: data set '{shown(name)}'"
     dtype = data.dtype
     if dtype.kind not in "Siuf" or dtype.subdtype is not None:
         raise DatasetError(
@@ -178,6 +198,11 @@ def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) ->
         raise DatasetError(
             f"{label} declares {data.size * dtype.itemsize} bytes and stores "
             f"{data.id.get_storage_size()}; it was never written or is a bomb"
+        )
+    unit = data.attrs.get_id("unit").dtype if "unit" in data.attrs else None
+    if unit is not None and (unit.kind != "S" or unit.itemsize > UNIT_BYTES_LIMIT):
+        raise DatasetError(
+            f"{label} has a unit of type {unit}; it must be a short text"
         )
     column = known_column(name)
     if column is None:
@@ -209,6 +234,9 @@ def _is_stored(data: h5py.Dataset, used: set[int]) -> bool:
     """False for what declares more than its bytes in the file can hold, in all or in one chunk."""
     item, chunks = data.dtype.itemsize, data.chunks or (0,)
     chunk = math.prod(chunks) * item
+    at_once = math.prod(data.shape[1:] if data.ndim > 1 else data.shape) * item
+    if used and max(at_once, chunk) > COMPRESSED_LIMIT:
+        return False
     if BLOSC2_FILTER in used:
         sizes = zip(data.shape, chunks, strict=True)
         n_chunks = math.prod(-(-length // step) for length, step in sizes)
@@ -237,10 +265,17 @@ def _check_scale(
         )
 
 
-def _check_attributes(file: h5py.File, path: Path) -> None:
+def _check_attributes(
+    file: h5py.File, contents: dict[str, h5py.Dataset], path: Path
+) -> None:
     if len(file.attrs) > ATTRIBUTES_LIMIT:
         raise DatasetError(
             f"{path} has {len(file.attrs)} attributes; it is no gensig shard"
+        )
+    if too_large := oversized_attributes(file):
+        raise DatasetError(
+            f"{path}: attribute {shown(too_large[0])} has more than {ATTRIBUTE_BYTES_LIMIT} "
+            "bytes; it is no gensig shard"
         )
     attributes = read_attributes(file)
     missing = [name for name in REQUIRED_ATTRIBUTES if name not in attributes]
@@ -258,16 +293,11 @@ def _check_attributes(file: h5py.File, path: Path) -> None:
         raise DatasetError(
             f"{path}: sampling_rate_hz is {rate}; it must be a positive number"
         )
-    for name in ("channel_names", "class_names"):
-        value = attributes[name]
-        if not isinstance(value, list) or {*map(type, value)} - {str}:
-            raise DatasetError(f"{path}: attribute {name} must be a list of text")
-    n_names, n_channels = (
-        len(attributes["channel_names"]),
-        file["acceleration"].shape[1],
-    )
-    if n_names != n_channels:
-        raise DatasetError(f"{path}: {n_names} channel names for {n_channels} channels")
+    lengths = {"channel": contents["acceleration"].shape[1]}
+    if "acceleration_source" in contents:
+        lengths["source"] = contents["acceleration_source"].shape[1]
+    if problem := attribute_problem(attributes, lengths):
+        raise DatasetError(f"{path}: {problem}")
 
 
 def shard_labels(file: h5py.File) -> dict:
@@ -288,10 +318,19 @@ def read_rows(data: h5py.Dataset) -> np.ndarray:
     return values
 
 
+def unknown_class(labels: np.ndarray, class_names: Sequence[str]) -> str:
+    """One line on the first label that is no number of a class; '' for none."""
+    wrong = labels[(labels < 0) | (labels >= len(class_names))]
+    if not wrong.size:
+        return ""
+    return f"it has the label {wrong[0]}, and {len(class_names)} classes"
+
+
 def first_line(error: Exception) -> str:
     """The first line of an error's text."""
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
-def _plain(text: str) -> str:
+def shown(text: str) -> str:
+    """A name out of a file on one printable line of moderate length."""
     return "".join(c if c.isprintable() else "?" for c in text)[:80]

@@ -40,6 +40,7 @@ from gensig.dataset.schema import (
 from gensig.dataset.storage.attributes import Attribute, set_attribute
 from gensig.dataset.storage.compression import (
     BLOSC2_CHUNK_LIMIT,
+    COMPRESSED_LIMIT,
     COMPRESSIONS,
     creation_options,
     fixed_settings,
@@ -354,10 +355,12 @@ def _check_declaration(writer: ShardWriter, params: Sequence[str]) -> None:
                 f"{name}: signal {signal} of shape {shape} is not allowed; allowed are {allowed}"
             )
         n_bytes = math.prod(shape) * signal_column(signal).n_bytes
-        if writer.compression == "blosc2" and n_bytes > BLOSC2_CHUNK_LIMIT:
+        limits = {"none": n_bytes, "blosc2": BLOSC2_CHUNK_LIMIT}
+        limit = limits.get(writer.compression, COMPRESSED_LIMIT)
+        if n_bytes > limit:
             raise DatasetError(
-                f"{name}: a record's {signal} has {n_bytes} bytes, blosc2 takes "
-                f"{BLOSC2_CHUNK_LIMIT}; make shorter records or choose another compression"
+                f"{name}: a record's {signal} has {n_bytes} bytes, {writer.compression} takes "
+                f"{limit}; make shorter records or choose another compression"
             )
     missing = [key for key in REQUIRED_ATTRIBUTES if key not in writer.attributes]
     if missing or "acceleration" not in writer.signals:

@@ -13,7 +13,7 @@ import numpy as np
 from gensig.errors import ConfigError
 from gensig.signals.reading.promised_sizes import check_decoded
 from gensig.signals.reading.recording_files import LEAST_SAMPLES, Content
-from gensig.text.user_file import check_file
+from gensig.text.user_file import open_table
 
 MOST_HEADER_LINES = 1000
 LONGEST_LINE = 100_000  # characters
@@ -34,12 +34,11 @@ def read_numbers(file: str, header_lines: str | None) -> Content:
     ConfigError    for lines that are no numbers or have another number of columns
     """
     path = Path(file).expanduser()
-    check_file(file, path)
     skipped, line = _first_numbers(file, path, header_lines)
     separator = next((sign for sign in SEPARATORS if sign in line), None)
     n_columns = len(_cells(line, separator))
     try:
-        with path.open(encoding="utf-8", errors="replace") as stream:
+        with open_table(file, path, errors="replace") as stream:
             values = np.loadtxt(
                 islice(stream, skipped, None),
                 delimiter=separator,
@@ -63,7 +62,7 @@ def read_numbers(file: str, header_lines: str | None) -> Content:
 
 def _first_numbers(file: str, path: Path, header_lines: str | None) -> tuple[int, str]:
     """Number of lines before the numbers, and the first line of numbers."""
-    with path.open(encoding="utf-8", errors="replace") as stream:
+    with open_table(file, path, errors="replace") as stream:
         for index in range(MOST_HEADER_LINES + 1):
             line = stream.readline(LONGEST_LINE)
             if not line:
