@@ -47,6 +47,7 @@ WRITING = {
     "finalize": ("finalize", "{set}"),
 }
 READ = "open_dataset"
+LINES = "GENSIG_FORGED_LINES"  # likewise: prints the line of each verb
 VERBS = "GENSIG_FORGED_VERBS"  # variable of the environment: names of the verbs to call
 
 
@@ -125,7 +126,7 @@ def _status(verb: str, call: Callable[[], int], faults: list[str]) -> int:
     text = said.getvalue() + out.getvalue()
     if "Traceback" in text or any(word in text for word in SWALLOWED):
         faults.append(f"{verb}: {text[-300:]}")
-    if os.environ.get("SHOW_LINES"):
+    if os.environ.get(LINES):
         print(verb, status, (lines or [""])[-1][:200], flush=True)
     return status
 

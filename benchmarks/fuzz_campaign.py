@@ -5,6 +5,11 @@ forged shards, manifests and tables. None may crash or hang the reader, fill its
 look outside the folder, or pass in silence. ``--mutants`` is their number, ``--first`` the first
 seed, ``--folder`` a data set to mutate instead of a new one, ``--json FILE`` writes the
 figures. The exit status is 1 where any mutant did harm.
+
+``--forged`` takes the forgeries of `benchmarks._forged_sets` in place of accidents: every digest is
+recomputed, and every verb of both commands that reads a set is called on it with limits of memory
+and time (`benchmarks._forged_judge`). ``--verbs`` names some of them; with `GENSIG_FORGED_LINES=1`
+in the environment the line of each verb is printed.
 """
 
 from __future__ import annotations
@@ -12,6 +17,7 @@ from __future__ import annotations
 import argparse
 import collections
 import json
+import os
 import platform
 import sys
 import tempfile
@@ -20,6 +26,7 @@ from pathlib import Path
 
 import h5py
 
+from benchmarks import _forged_judge
 from benchmarks._fuzz_judge import verdicts
 
 OVERRIDES = (
@@ -27,6 +34,14 @@ OVERRIDES = (
     "plan.n_records=4",
     "dataset.records_per_shard=2",
     "operating.duration_s=0.02",
+)
+# every verb of both commands takes this one when it is whole
+FORGED_OVERRIDES = (
+    "plan.classes=[healthy,crack,pitting,missing_tooth]",
+    "plan.n_records=24",
+    "dataset.records_per_shard=8",
+    "operating.duration_s=0.2",
+    "sensing.sampling_rate_hz=10000",
 )
 
 
@@ -38,7 +53,13 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--folder", type=Path)
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--forged", action="store_true")
+    parser.add_argument("--verbs", default="", help="with --forged: names, with commas")
     arguments = parser.parse_args()
+    campaign, overrides = None, OVERRIDES
+    if arguments.forged:
+        campaign, overrides = _forged_judge.FORGERS, FORGED_OVERRIDES
+        os.environ[_forged_judge.VERBS] = arguments.verbs
     begin = time.monotonic()
     with tempfile.TemporaryDirectory() as scratch:
         template = arguments.folder
@@ -46,11 +67,11 @@ def main() -> int:
             import gensig
 
             template = Path(scratch) / "template"
-            gensig.generate(*OVERRIDES, out=template).close()
+            gensig.generate(*overrides, out=template).close()
         seeds = range(arguments.first, arguments.first + arguments.mutants)
         harmful, noticed = [], collections.Counter[bool]()
         only_verify = collections.Counter[str]()
-        for verdict in verdicts(template, Path(scratch), seeds):
+        for verdict in verdicts(template, Path(scratch), seeds, campaign):
             noticed[verdict.noticed] += 1
             if verdict.noticed and not verdict.refused:
                 only_verify[verdict.kind] += 1

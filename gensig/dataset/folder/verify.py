@@ -223,6 +223,8 @@ def _tables(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | None]:
         plan = read_plan(folder / PLAN)
     except DatasetError as error:
         return [*problems, str(error)], None
+    if problem := records_problem(plan.n_records, manifest):
+        return [*problems, problem], None
     if plan.shard_sizes() != [entry.rows for entry in manifest.shards]:
         line = f"{PLAN} and the manifest have different shards; one was altered"
         return [*problems, line], None

@@ -17,7 +17,7 @@ from gensig.dataset.schema import (
     known_column,
 )
 from gensig.dataset.storage.atomic import link_text
-from gensig.dataset.storage.attribute_check import attribute_problem
+from gensig.dataset.storage.attribute_check import KINDS, attribute_problem
 from gensig.dataset.storage.attributes import (
     ATTRIBUTE_BYTES_LIMIT,
     HDF5_ERRORS,
@@ -296,6 +296,11 @@ def _check_attributes(
     lengths = {"channel": contents["acceleration"].shape[1]}
     if "acceleration_source" in contents:
         lengths["source"] = contents["acceleration_source"].shape[1]
+    for name in KINDS.keys() - attributes.keys():
+        if name in file.attrs:
+            raise DatasetError(
+                f"{path}: attribute {name} has no plain type; it must be {KINDS[name]}"
+            )
     if problem := attribute_problem(attributes, lengths):
         raise DatasetError(f"{path}: {problem}")
 
