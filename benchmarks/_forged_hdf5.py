@@ -114,7 +114,7 @@ def shard_structure(folder: Path, rng: Rng) -> None:
 
 
 def many_columns(folder: Path, rng: Rng) -> None:
-    count = int(chosen((2000, 20000), rng))
+    count = int(chosen((500, 10_001), rng))
 
     def change(file: h5py.File) -> None:
         n = file["record_id"].shape[0]

@@ -27,7 +27,10 @@ from gensig.errors import DatasetError
 
 METHOD = "spawn"
 TIME_LIMIT = 60.0  # s a mutant, on a machine that does other things too
-PREPARE_LIMIT = 600.0  # s until a process has compiled what it needs
+PREPARE_LIMIT = (
+    600.0  # s until a process has compiled what it needs, or a mutant is made
+)
+NOT_MADE = "not made yet"
 MEMORY_LIMIT = 400 * 1024**2  # bytes a mutant may add; the sets are far below 1 MB
 
 
@@ -162,6 +165,7 @@ def _work(
     for seed in seeds:
         folder = scratch / f"mutant-{seed}" / "set"
         shutil.copytree(template, folder)
+        pipe.send((seed, NOT_MADE, None, False, False))
         mutant = campaign.change(folder, seed)
 
         def tell(doing: str, seed: int = seed, kind: str = mutant.kind) -> None:
@@ -201,7 +205,7 @@ def verdicts(
                     fault = f"hung for {limit:g} s"
                     break
                 seed, kind, outcome, noticed, refused = here.recv()
-                limit = TIME_LIMIT
+                limit = PREPARE_LIMIT if kind == NOT_MADE else TIME_LIMIT
             except EOFError:
                 break
             if outcome is not None:

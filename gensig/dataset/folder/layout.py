@@ -150,23 +150,44 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
     write_text(folder / MANIFEST, manifest_text(manifest))
 
 
-def refuse_links(folder: Path) -> None:
-    """Raise DatasetError for the first file or folder of a data set that is a symbolic link.
+def refuse_special(folder: Path) -> None:
+    """Raise DatasetError for the first part of a data set that is no ordinary file or folder.
 
-    It does not matter to where a link leads. The folder itself may be named by a link, and so may
-    files that are no part of the data set.
+    Symbolic links are refused wherever they lead, and so are named pipes, sockets and devices. The
+    folder itself may be named by a link, and so may files that are no part of the data set.
     """
     names = [folder / name for name in (*NAMES, *PARTS)]
     for path in names:
         if path.is_symlink():
             raise DatasetError(link_text(path))
+    for path in names[: len(NAMES)]:
+        if path.exists() and not path.is_file():
+            raise DatasetError(_special_text(path, "file"))
     for part in names[len(NAMES) :]:
         if not part.is_dir():
+            if part.exists():
+                raise DatasetError(_special_text(part, "folder"))
             continue
         with os.scandir(part) as entries:
-            linked = sorted(entry.name for entry in entries if entry.is_symlink())
-        if linked:
-            raise DatasetError(link_text(part / linked[0]))
+            special = [entry for entry in entries if not _is_ordinary(entry)]
+        for entry in sorted(special, key=lambda entry: entry.name):
+            path = part / entry.name
+            if entry.is_symlink():
+                raise DatasetError(link_text(path))
+            raise DatasetError(_special_text(path, "file"))
+
+
+def _is_ordinary(entry: os.DirEntry[str]) -> bool:
+    """True for a file and for a folder, which is none of a data set's and is left alone."""
+    return entry.is_file(follow_symlinks=False) or entry.is_dir(follow_symlinks=False)
+
+
+def _special_text(path: Path, wanted: str) -> str:
+    """The line on what is neither a file nor a folder, or the wrong one of them."""
+    return (
+        f"{path} is no ordinary {wanted}; a data set holds nothing else: put the {wanted} back or "
+        "remove what is there"
+    )
 
 
 def read_manifest(folder: Path) -> Manifest:
@@ -174,12 +195,12 @@ def read_manifest(folder: Path) -> Manifest:
 
     Raises
     ------
-    DatasetError    when the folder is no data set, a part of it is a symbolic link, or the
-                    manifest is damaged, newer than this gensig, or names a file that is not one
-                    of a data set (such as '../other')
+    DatasetError    when the folder is no data set, a part of it is a symbolic link or no ordinary
+                    file, or the manifest is damaged, newer than this gensig, promises more than a
+                    plan can hold, or names a file that is not one of a data set ('../other')
     """
     folder = Path(folder)
-    refuse_links(folder)
+    refuse_special(folder)
     path = folder / MANIFEST
     if not path.is_file():
         if not folder.exists():

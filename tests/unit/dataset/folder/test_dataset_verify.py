@@ -144,7 +144,7 @@ def test_folder_that_is_no_datasetting(tmp_path):
     with pytest.raises(DatasetError, match="none does not exist"):
         verify(tmp_path / "none")
     os.mkfifo(tmp_path / "manifest.json")  # must not hang
-    with pytest.raises(DatasetError, match="no gensig data set"):
+    with pytest.raises(DatasetError, match="is no ordinary file"):
         verify(tmp_path)
 
 

@@ -1,6 +1,8 @@
 """Symbolic links in the folder of a data set, which every reader and verb refuses."""
 
+import os
 import shutil
+import signal
 
 import pytest
 from dataset_samples import build, make_plan
@@ -76,6 +78,41 @@ def test_a_link_is_refused_in_one_line_wherever_the_folder_is_read(
         assert line in said
     assert main(["verify", str(folder)]) == 1
     assert line in capsys.readouterr().out
+
+
+@pytest.fixture
+def impatient():
+    """The test ends where a pipe is waited for."""
+    signal.alarm(60)
+    yield
+    signal.alarm(0)
+
+
+@pytest.mark.usefixtures("impatient")
+@pytest.mark.parametrize("name", NAMES)
+def test_a_pipe_in_place_of_a_part_is_refused_in_one_line(
+    folder, tmp_path, capsys, name
+):
+    path = folder / name
+    path.rename(tmp_path / "kept")
+    os.mkfifo(path)
+    line = f"{path} is no ordinary f"
+    for verb in ("resume", "inspect"):
+        assert main([verb, str(folder)]) == 2
+        (said,) = capsys.readouterr().err.splitlines()
+        assert line in said
+    with pytest.raises(DatasetError, match="is no ordinary f"):
+        open_dataset(folder)
+    if name != "manifest.json":
+        assert [problem[: len(line)] for problem in verify(folder).problems] == [line]
+
+
+@pytest.mark.parametrize("name", ["plan.csv", "index.h5", "run.log"])
+def test_a_folder_in_place_of_a_file_is_refused(folder, name):
+    (folder / name).unlink()
+    (folder / name).mkdir()
+    with pytest.raises(DatasetError, match=f"{name} is no ordinary file"):
+        open_dataset(folder)
 
 
 def test_links_that_are_no_part_of_the_set_are_left_alone(folder, tmp_path):
