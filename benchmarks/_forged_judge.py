@@ -18,7 +18,7 @@ from typing import Any
 
 from benchmarks._damaged_folders import Mutant
 from benchmarks._forged_sets import forge_set
-from benchmarks._fuzz_judge import Campaign, Judged, read_all
+from benchmarks._fuzz_judge import Campaign, Judged, meaning, read_all
 from gensig.errors import GensigError
 
 ADDRESS_SPACE = 2 * 1024**3  # bytes that a verb may add
@@ -158,4 +158,4 @@ def prepare(template: Path) -> None:
         raise RuntimeError(f"the good set is refused: {statuses}, {faults}")
 
 
-FORGERS = Campaign(change=forge_set, judge=judge, prepare=prepare)
+FORGERS = Campaign(change=forge_set, judge=judge, meaning=meaning, prepare=prepare)

@@ -45,13 +45,15 @@ class Campaign:
     Attributes
     ----------
     change : folder and seed -> what was changed
-    judge : folder, mutant, meaning of the unchanged manifest, and a function that tells the
+    judge : folder, mutant, meaning of the unchanged folder, and a function that tells the
         watching process what is tried now -> fault, noticed, refused
+    meaning : of an unchanged folder, what an accepted mutant must still say
     prepare : called once in each process with the unchanged folder
     """
 
     change: Callable[[Path, int], Mutant]
     judge: Callable[[Path, Mutant, dict[str, Any], Callable[[str], None]], Judged]
+    meaning: Callable[[Path], dict[str, Any]]
     prepare: Callable[[Path], None] | None = None
 
 
@@ -105,7 +107,7 @@ def judge(
     ):
         faults.append("wrote a file")
     noticed = bool(lines) or not checked
-    if not noticed and not mutant.forged and _meaning(folder) != whole:
+    if not noticed and not mutant.forged and meaning(folder) != whole:
         faults.append("accepted in silence")
     return "; ".join(faults), noticed, not read
 
@@ -135,7 +137,7 @@ def read_all(folder: Path) -> None:
             data.split(protocol)
 
 
-def _meaning(folder: Path) -> dict[str, Any]:
+def meaning(folder: Path) -> dict[str, Any]:
     """Keys of a manifest that decide what is read, with their values."""
     content = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     known = set(read_manifest(folder).__slots__) - {"environment", "configuration"}
@@ -159,7 +161,7 @@ def _work(
     template: Path, scratch: Path, seeds: range, pipe: Connection, campaign: Campaign
 ) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    whole = _meaning(template)
+    whole = campaign.meaning(template)
     if campaign.prepare is not None:
         campaign.prepare(template)
     for seed in seeds:
@@ -189,7 +191,7 @@ def verdicts(
     A process that dies or hangs is one too, and another takes over behind it.
     """
     context = multiprocessing.get_context(METHOD)
-    campaign = campaign or Campaign(change=mutate, judge=judge)
+    campaign = campaign or Campaign(change=mutate, judge=judge, meaning=meaning)
     while len(seeds):
         here, there = context.Pipe(duplex=False)
         worker = context.Process(
@@ -198,7 +200,7 @@ def verdicts(
         worker.start()
         there.close()
         seed, kind, fault = seeds[0], "not begun", "died"
-        limit = TIME_LIMIT if campaign.prepare is None else PREPARE_LIMIT
+        limit = PREPARE_LIMIT
         while True:
             try:
                 if not here.poll(limit):

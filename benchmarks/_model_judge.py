@@ -6,21 +6,18 @@ import contextlib
 import io
 import json
 import math
-from collections.abc import Sequence
-from multiprocessing.connection import Connection
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from benchmarks._damaged_folders import Mutant
 from benchmarks._damaged_models import mutate
-from benchmarks._fuzz_judge import try_mutants
+from benchmarks._fuzz_judge import Campaign, Judged
 from benchmarks._stored_models import ASKED
 from diagnose.cli import main
 
 ANSWERED, REFUSED, DAMAGED = (0, 3), 2, 1
 PLACES = ("recording", "model")  # of an answer; where things lie
-
-Judged = tuple[str, bool, bool]
 
 
 def said(words: Sequence[str]) -> tuple[int, str, str]:
@@ -36,7 +33,12 @@ def answers(models: Path) -> dict[str, Any]:
     return {asked.name: json.loads(said(asked.words(models))[1]) for asked in ASKED}
 
 
-def judge(models: Path, mutant: Mutant, whole: dict[str, Any]) -> Judged:
+def judge(
+    models: Path,
+    mutant: Mutant,
+    whole: dict[str, Any],
+    _tell: Callable[[str], None] = print,
+) -> Judged:
     """The fault ('' for none), whether anything noticed the change, whether predict refused."""
     name = mutant.kind.partition(":")[0]
     (asked,) = (one for one in ASKED if one.name == name)
@@ -88,11 +90,4 @@ def _is_finite(value: Any) -> bool:
     return not isinstance(value, float) or math.isfinite(value)
 
 
-def work(template: Path, scratch: Path, seeds: range, pipe: Connection) -> None:
-    """Try the mutants of some seeds, as `benchmarks._fuzz_judge.verdicts` asks."""
-    whole = answers(template)
-    try_mutants(
-        (template, scratch, seeds, pipe),
-        mutate,
-        lambda models, mutant: judge(models, mutant, whole),
-    )
+CAMPAIGN = Campaign(change=mutate, judge=judge, meaning=answers)

@@ -20,10 +20,8 @@ from pathlib import Path
 
 from benchmarks._damaged_models import SIGNED_ANEW
 from benchmarks._fuzz_judge import verdicts
-from benchmarks._model_judge import work
+from benchmarks._model_judge import CAMPAIGN
 from benchmarks._stored_models import make_models
-
-PATIENCE = 240.0  # s a mutant; a process that begins imports torch first
 
 
 def main() -> int:
@@ -40,7 +38,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as scratch:
         template = Path(scratch) / "template"
         make_models(template)
-        for verdict in verdicts(template, Path(scratch), seeds, work, PATIENCE):
+        for verdict in verdicts(template, Path(scratch), seeds, CAMPAIGN):
             outcome = "answered as the untouched model"
             if verdict.kind.endswith(SIGNED_ANEW):
                 outcome = "signed anew, finite answer"

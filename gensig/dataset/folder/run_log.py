@@ -14,8 +14,7 @@ from gensig.text.escaping import one_line
 
 def log(folder: Path, text: str) -> None:
     """Append one line; a disk that refuses it stops nothing, because the log decides nothing."""
-    line = f"{now()} {one_line(text)}
-"
+    line = f"{now()} {one_line(text)}\n"
     flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
     with (
         suppress(OSError),

@@ -45,8 +45,8 @@ def tried(template, tmp_path_factory):
     seeds = range(0, n_models * len(FAMILIES), n_models)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(_fuzz_judge, "METHOD", "fork")
-        work = _model_judge.work
-        return list(_fuzz_judge.verdicts(template, scratch, seeds, work))
+        campaign = _model_judge.CAMPAIGN
+        return list(_fuzz_judge.verdicts(template, scratch, seeds, campaign))
 
 
 def test_no_mutant_of_a_model_does_harm(tried):
