@@ -339,8 +339,11 @@ def detectability(residual: Array, noise_power: Array) -> float:
 
 
 def add_noise(clean: Array, noise_power: Array, rng: np.random.Generator) -> Array:
-    """Add white Gaussian noise of the given power to each channel, (channel, sample)."""
-    noisy = np.empty_like(clean)
+    """Add white Gaussian noise of the given power to each channel, (channel, sample).
+
+    The result is in C order, whatever the order of the input in memory.
+    """
+    noisy = np.empty(clean.shape)
     # channel by channel: each stays in the cache
     for row, signal, variance in zip(noisy, clean, noise_power, strict=True):
         rng.standard_normal(out=row)

@@ -42,14 +42,16 @@ class Instrument:
 
         Parameters
         ----------
-        source : (channel, n_lead + sample) m/s2    accelerations at the bearings
+        source : (channel, n_lead + sample) m/s2    accelerations at the bearings, in any order
+            in memory
 
         Returns
         -------
-        (sensor, sample) m/s2
+        (sensor, sample) m/s2    in C order, as sums along it need for equal bits
         """
         sensor, sensors = self.sensing.sensor, self.sensors
         filters = sensor is not None and sensors is not None and not sensor.is_ideal
+        source = np.ascontiguousarray(source)
         if self.path is None and not filters:
             return source
         lines = self._at_sensors(source)

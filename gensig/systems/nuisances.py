@@ -55,7 +55,9 @@ def with_nuisances(
         counted = [name.endswith(SPEED) for name in run.system.sensing.channels]
         gain = np.where(counted, 1.0, run.gearbox.gain)[:, None]
     heard = nuisance_acceleration(run, machine, tones, record.shaft_angle)
-    return replace(record, acceleration=record.acceleration + gain * heard)
+    # left alone, NumPy takes the order of one or the other, by their size
+    shaken = np.add(record.acceleration, gain * heard, order="C")
+    return replace(record, acceleration=shaken)
 
 
 def nuisance_acceleration(

@@ -8,9 +8,10 @@ import pytest
 
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.record.inputs import InputReader
+from gensig.record.inputs import InputReader, simulate_motions
 from gensig.record.simulate import forget_twins, simulate_records
-from gensig.systems.nuisances import with_nuisances
+from gensig.systems import nuisances
+from gensig.systems.nuisances import nuisance_acceleration, with_nuisances
 from gensig.systems.run import CleanRecord
 
 BASE = (
@@ -97,7 +98,7 @@ def test_no_class_has_others(shaking):
         integration_check="none",
     )
 
-    def nuisances(row, **numbers):
+    def shaken_by(row, **numbers):
         inputs = reader.inputs(row)
         inputs = replace(inputs, numbers=replace(inputs.numbers, **numbers))
         streams = inputs.nuisance_streams()
@@ -105,11 +106,11 @@ def test_no_class_has_others(shaking):
         return bool(inputs.run.faults), shaken
 
     sound = {**faulty, "faults_json": "[]", "label_name": "healthy"}
-    (has_fault, shaken), (still_has, same) = nuisances(faulty), nuisances(sound)
+    (has_fault, shaken), (still_has, same) = shaken_by(faulty), shaken_by(sound)
     assert (has_fault, still_has) == (True, False)
     np.testing.assert_array_equal(shaken, same)
     assert np.all(shaken.std(axis=1) > 0.0)
-    assert not np.array_equal(nuisances(faulty, gearbox=7)[1], shaken)
+    assert not np.array_equal(shaken_by(faulty, gearbox=7)[1], shaken)
 
 
 def test_the_floor_of_a_condition_counts_them_and_is_one(shaking, both):
@@ -131,3 +132,38 @@ def test_what_a_fault_adds_is_told_from_what_the_machine_has_anyway(both):
         else:
             # the floor has risen a little with the twin, the residual has not
             assert 0.7 < value / other.values["detectability"] < 1.01
+
+
+MACHINE = read_request(["sensing=machine"]).config["sensing"]
+NUISANCES = {part["kind"]: part for part in MACHINE["nuisances"]}
+
+
+@pytest.mark.parametrize("place", ["bearing", "housing"])
+@pytest.mark.parametrize("kind", list(NUISANCES))
+def test_any_nuisance_may_be_alone_at_any_sensor(kind, place):
+    """Low orders alone are made at a few samples and interpolated, in columns."""
+    base = ["plan.n_records=1", "operating.duration_s=0.05", f"sensing={place}"]
+    config = read_request(base).config
+    alone = config.with_keys("sensing", nuisances=[NUISANCES[kind]])
+    (record,) = made(alone)
+    (without,) = made(config)
+    assert record.values.get("status") != "failed"
+    assert np.any(added(record, without, "acceleration"))
+
+
+def test_low_orders_alone_lie_in_columns_and_what_they_shake_in_rows(
+    still, monkeypatch
+):
+    """Sums along a record round as its order in memory says, so that order is always one."""
+    alone = still.with_keys("sensing", nuisances=[NUISANCES["unbalance"]])
+    heard = []
+
+    def keeping(*arguments):
+        heard.append(nuisance_acceleration(*arguments))
+        return heard[-1]
+
+    monkeypatch.setattr(nuisances, "nuisance_acceleration", keeping)
+    inputs = InputReader(alone).inputs(rows_of(alone)[0])
+    (motion,) = simulate_motions([inputs])
+    assert not heard[0].flags.c_contiguous
+    assert motion.acceleration.flags.c_contiguous

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
-from sensing_groups import BEARING, HOUSING, changed, instrument, source
+from sensing_groups import BEARING, HOUSING, MACHINE, changed, instrument, source
 
 from gensig.sensing.chain import add_noise, power
 
@@ -120,3 +120,48 @@ def test_gearboxes_differ_and_path_and_sensor_have_their_own_numbers():
         few_modes.sensors.gain,
         instrument(HOUSING).sensors.gain,
     )
+
+
+def in_columns(signal):
+    return np.asfortranarray(signal)
+
+
+def every_other(signal):
+    return np.repeat(signal, 2, axis=1)[:, ::2]
+
+
+def backwards(signal):
+    return np.ascontiguousarray(signal[:, ::-1])[:, ::-1]
+
+
+@pytest.mark.parametrize("laid_out", [in_columns, every_other, backwards])
+@pytest.mark.parametrize(
+    "group", [BEARING, HOUSING, MACHINE], ids=("bearing", "housing", "machine")
+)
+def test_no_order_in_memory_decides_about_a_record(group, laid_out):
+    """Sums of a path or a power round as the order says, so the first step sets one."""
+    chain = instrument(group)
+    emitted = source(chain.sensing, 3000)
+    other = laid_out(emitted)
+    assert not other.flags.c_contiguous
+
+    expected, measured = chain.measure(emitted), chain.measure(other)
+    assert_array_equal(measured, expected)
+    assert_array_equal(chain.power(measured), chain.power(expected))
+
+    noise_power = chain.power(expected)
+    drifted = [chain.drifted(x, default_rng(1)) for x in (expected, laid_out(expected))]
+    assert_array_equal(*drifted)
+    noisy = [
+        chain.transmitted(
+            chain.record(x, noise_power, default_rng(2))[0], default_rng(3)
+        )[0]
+        for x in (expected, laid_out(expected))
+    ]
+    assert_array_equal(*noisy)
+
+
+def test_a_sum_along_another_order_in_memory_differs():
+    """The reason why what is measured has one order."""
+    signal = default_rng(0).standard_normal((4, 51_200))
+    assert np.any(power(in_columns(signal)) != power(signal))
