@@ -1,4 +1,4 @@
-"""Doubts on a plan: speeds, loads and noise that no machine has, or that no record can hold."""
+"""Doubts on a plan: speeds, loads and noise that no machine has, and labels of one signal."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from gensig.errors import GensigError
 from gensig.life.root.root_stress import root_factors
 from gensig.life.root.strength import Strength
 from gensig.options.configuration import Configuration
+from gensig.plan.equal_classes import equal_classes
 from gensig.record.inputs import InputReader
 from gensig.systems.base import Machine
 from gensig.units import from_si, read
@@ -34,6 +35,7 @@ def plan_doubts(config: Configuration, plan: Plan) -> list[str]:
         *_above_the_band(machine_of("speed_set_rpm")),
         *_too_strong(config, machine_of("torque_nm")),
         *_absurd_noise(columns["snr_db"]),
+        *equal_classes(config, plan),
     ]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,16 +23,22 @@ from gensig.geometry.contact import SIDES
 from gensig.geometry.tooth_profile import root_curve_point
 from gensig.life.life_options import runs_to_failure
 from gensig.options.configuration import Configuration
+from gensig.plan.unit_designs import unit_load_torque
 from gensig.record.machines import read_machine
-from gensig.record.options import AS_GIVEN, DRAWN, read_plan_options
+from gensig.record.options import (
+    AS_GIVEN,
+    DRAWN,
+    TORQUE_KEY,
+    draws_unit_load,
+    read_plan_options,
+)
 from gensig.record.streams import Stream, stream
 from gensig.systems.registry import LINE, read_gear_group, read_pair
+from gensig.systems.tooth_reach import tooth_reach
 from gensig.units import from_si, split_unit, to_si
 
 # Keys of a distribution that are multiplied by a size where they are shares of it.
 SCALED = ("low", "high", "mean", "std", "values")
-# Key that limits the highest value to a share of the root chord of the faulted gear.
-CEILING = "at_most_of_root_chord"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -281,6 +287,17 @@ def _root_chord(config: Configuration, gear: str) -> float:
     return 2.0 * root_curve_point(gears[gear], "arc_mid")[1]
 
 
+def _least_reach(config: Configuration, gear: str) -> float:
+    """Distance that a tooth may stand back and still touch under a plan's least torque, m."""
+    plan = read_plan_options(config)
+    if TORQUE_KEY in plan.vary:
+        torque = plan.vary[TORQUE_KEY].least
+        if draws_unit_load(config):
+            torque *= unit_load_torque(read_pair(config))
+        config = config.with_values({TORQUE_KEY: torque})
+    return tooth_reach(read_machine(config), gear)
+
+
 def _for_gear(
     config: Configuration, part: Mapping[str, Any], key: str, spec: Any
 ) -> Any:
@@ -290,34 +307,44 @@ def _for_gear(
     """
     if not isinstance(spec, Mapping):
         return spec
-    if spec.get("distribution") != "tooth" and "of" not in spec:
+    limits = [name for name in CEILINGS if name in spec]
+    if spec.get("distribution") != "tooth" and "of" not in spec and not limits:
         return spec
     gear = part["gear"]
     n_teeth, sizes = _gear_sizes(config, gear)
     if spec.get("distribution") == "tooth":
         return {**spec, "distribution": "integers", "low": 0, "high": n_teeth - 1}
     unit = split_unit(key)[1]
-    if spec["of"] not in sizes or unit not in ("mm", "um"):
-        raise ConfigError(
-            f"fault.vary.{key}: of = {spec['of']!r}; a length may be drawn as a share of "
-            f"{', '.join(sizes)}"
-        )
-    size = from_si(key, to_si("size_mm", sizes[spec["of"]]))
-
     drawn = dict(spec)
-    del drawn["of"]
-    ceiling = drawn.pop(CEILING, None)
+    size = 1.0
+    if "of" in drawn:
+        if spec["of"] not in sizes or unit not in ("mm", "um"):
+            raise ConfigError(
+                f"fault.vary.{key}: of = {spec['of']!r}; a length may be drawn as a share of "
+                f"{', '.join(sizes)}"
+            )
+        size = from_si(key, to_si("size_mm", sizes[drawn.pop("of")]))
+    shares = {name: drawn.pop(name) for name in limits}
     try:
         for name in SCALED:
             if isinstance(drawn.get(name), list):
                 drawn[name] = [value * size for value in drawn[name]]
             elif name in drawn:
                 drawn[name] *= size
-        if ceiling is not None:
-            highest = from_si(key, ceiling * _root_chord(config, gear))
+        for name, share in shares.items():
+            highest = from_si(key, share * CEILINGS[name](config, gear))
             drawn["high"] = min(drawn["high"], highest)
         return drawn
-    except TypeError:
+    except (KeyError, TypeError):
         raise ConfigError(
-            f"fault.vary.{key}: {', '.join(SCALED)} must be numbers, or lists of them"
+            f"fault.vary.{key}: {', '.join([*SCALED, *shares])} must be numbers, or lists of "
+            "them" + ", with high" * bool(shares)
         ) from None
+
+
+# Keys that limit the highest value: to a share of the root chord of the faulted gear, or of the
+# distance that its teeth may stand back and still touch.
+CEILINGS: dict[str, Callable[[Configuration, str], float]] = {
+    "at_most_of_root_chord": _root_chord,
+    "at_most_of_reach": _least_reach,
+}
