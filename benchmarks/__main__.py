@@ -65,7 +65,7 @@ def kernels(runs: int) -> dict[str, float]:
             machines, 5, precision, NYSTROEM_CORE
         )
     boxes = _rates.two_stage_boxes()
-    core = line_core(len(boxes[0].pairs), len(boxes[0].angles))
+    core = line_core(boxes[0])
     for precision, machines in (("float64", boxes[:LANES]), ("float32", boxes)):
         works[TWO_STAGE.format(precision)] = _rates.kernel(machines, 5, precision, core)
     works[SCALAR] = _rates.scalar(eight, 5)

@@ -61,7 +61,7 @@ def least(work: Callable[[], Any], runs: int) -> float:
 
 
 def begin(program: str, about: str) -> tuple[argparse.Namespace, dict[str, Any], float]:
-    """``--runs`` and ``--json`` as given, the machine, which is printed, and when it began."""
+    """``--runs``, ``--json`` and ``--quick``, the machine, which is printed, and when it began."""
     parser = argparse.ArgumentParser(
         prog=f"python -m {program}", description=about.split("\n")[0]
     )
@@ -69,10 +69,22 @@ def begin(program: str, about: str) -> tuple[argparse.Namespace, dict[str, Any],
         "--runs", type=int, default=3, help="the least of so many (default 3)"
     )
     parser.add_argument("--json", help="also write the figures to this file")
+    add_quick(parser)
     arguments = parser.parse_args()
+    if arguments.quick:
+        arguments.runs = 1
     named, begun = machine(), time.perf_counter()
     print_machine(named)
     return arguments, named, begun
+
+
+def add_quick(parser: argparse.ArgumentParser) -> None:
+    """The flag ``--quick``: the least work that passes through all that a benchmark does."""
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="one run of the least work: shows that all of it runs, figures mean nothing",
+    )
 
 
 def in_turn(works: Mapping[str, Callable[[], Any]], runs: int) -> dict[str, float]:

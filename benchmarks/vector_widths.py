@@ -35,7 +35,7 @@ SCALAR = "scalar Numba RK4 x5"
 def rates(runs: int) -> dict[str, float]:
     """Rates of the cores and of scalar Numba in this process."""
     pairs, boxes = _rates.machines(), _rates.two_stage_boxes()
-    box_core = line_core(len(boxes[0].pairs), len(boxes[0].angles))
+    box_core = line_core(boxes[0])
     works = {SCALAR: _rates.scalar(pairs[:LANES], 5)}
     for precision, n in (("float64", LANES), ("float32", len(pairs))):
         works[f"pair {precision} x5"] = _rates.kernel(

@@ -23,6 +23,7 @@ from gensig.geometry.contact import SIDES
 from gensig.geometry.tooth_profile import root_curve_point
 from gensig.life.life_options import runs_to_failure
 from gensig.options.configuration import Configuration
+from gensig.plan.tooth_reach import tooth_reach
 from gensig.plan.unit_designs import unit_load_torque
 from gensig.record.machines import read_machine
 from gensig.record.options import (
@@ -34,7 +35,6 @@ from gensig.record.options import (
 )
 from gensig.record.streams import Stream, stream
 from gensig.systems.registry import LINE, read_gear_group, read_pair
-from gensig.systems.tooth_reach import tooth_reach
 from gensig.units import from_si, split_unit, to_si
 
 # Keys of a distribution that are multiplied by a size where they are shares of it.

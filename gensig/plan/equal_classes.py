@@ -13,9 +13,9 @@ from gensig.faults.base import Fault
 from gensig.faults.broken import MissingTooth
 from gensig.faults.registry import fault_parts
 from gensig.options.configuration import Configuration
+from gensig.plan.tooth_reach import passage_approach, tooth_reach
 from gensig.record.inputs import InputReader, row_faults
 from gensig.systems.base import Machine
-from gensig.systems.tooth_reach import passage_approach, tooth_reach
 from gensig.units import from_si
 
 Array = NDArray[np.float64]

@@ -10,10 +10,10 @@ from gensig.faults.flank_form import PitchError
 from gensig.plan.equal_classes import equal_classes
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
+from gensig.plan.tooth_reach import passage_approach, tooth_reach
 from gensig.record.inputs import InputReader
 from gensig.record.machines import read_machine
 from gensig.record.simulate import simulate_records
-from gensig.systems.tooth_reach import passage_approach, tooth_reach
 
 SYSTEMS = ("spur_pair", "helical_pair", "two_stage_gearbox")
 SMALL = ("plan.n_records=16", "plan.n_units=4", "operating.duration_s=0.05")

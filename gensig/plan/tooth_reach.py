@@ -16,7 +16,7 @@ from gensig.systems.base import Machine
 
 Array = NDArray[np.float64]
 
-PER_PITCH = 128  # rolls in a base pitch
+PER_PITCH = 512  # rolls in a base pitch
 
 
 def tooth_reach(machine: Machine, gear: str) -> float:
