@@ -23,6 +23,7 @@ from pathlib import Path
 
 PACKAGES = ("gensig", "diagnose")
 ORDER = "_given_order"  # the plugin beside this module
+HELPERS = (ORDER, "_stale_cache")  # modules that tests in a copy can import
 # Tests of the tree, of the pages and of the campaigns themselves.
 LEFT_OUT = (
     "tests/test_architecture.py",
@@ -43,13 +44,15 @@ COMMANDS = "tests/pipeline"
 # folder of tests of a package that has none below tests/unit
 FOLDERS = {"gensig/production": COMMANDS}
 MOST_FILES = 20  # of tests for one mutant, the nearest first
-FARTHEST = 3  # imports between a test and the mutated module
+FARTHEST = 3  # imports between a test and the mutated module, if a test is that near
+MOST_IMPORTS = 7  # such as from a command to the module that draws its picture
 ALIKE = (
     0.8  # likeness from which a test counts without imports, as its fixtures have them
 )
 SECONDS_A_TEST = 240  # a longer test hangs; the first may compile the kernels
 SECONDS_A_MUTANT = 900  # for all its tests
 KILLER = re.compile(r"^(?:FAILED|ERROR) (tests/\S+?\.py(?:::\w+)*)", re.MULTILINE)
+NAMED = re.compile(rf"\b(?:{'|'.join(PACKAGES)})(?:\.\w+)+")  # a module in a text
 PASSED, NO_TESTS, WRONG_USE = 0, 5, 4  # exit statuses of pytest
 
 
@@ -72,10 +75,15 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Copy:
-    """Copy of the tree of a project, in ``folder``; ``root`` is the project's own folder."""
+    """Copy of the tree of a project, in ``folder``; ``root`` is the project's own folder.
+
+    ``seconds_a_test`` and ``seconds`` are the limits of one test and of all for one mutant.
+    """
 
     root: Path
     folder: Path
+    seconds_a_test: float = SECONDS_A_TEST
+    seconds: float = SECONDS_A_MUTANT
 
     @property
     def tree(self) -> Path:
@@ -84,13 +92,14 @@ class Copy:
 
     @property
     def _plugins(self) -> Path:
-        """Folder of the plugin that keeps the order of the tests."""
+        """Folder of what this folder lends to the tests."""
         return self.folder / "plugins"
 
     def refresh(self) -> None:
         """Copy what has changed and remove what is gone; unchanged files keep their time."""
         self._plugins.mkdir(parents=True, exist_ok=True)
-        shutil.copy(Path(__file__).with_name(f"{ORDER}.py"), self._plugins)
+        for helper in HELPERS:
+            shutil.copy(Path(__file__).with_name(f"{helper}.py"), self._plugins)
         names = files_of(self.root)
         for name in names:
             source, target = self.root / name, self.tree / name
@@ -127,7 +136,7 @@ class Copy:
         options += ["-p", "no:cacheprovider"]
         if not all_of_them:
             options.append("-x")
-        options += ["-o", f"faulthandler_timeout={SECONDS_A_TEST}"]
+        options += ["-o", f"faulthandler_timeout={self.seconds_a_test}"]
         options += ["-o", "faulthandler_exit_on_timeout=true"]
         done = self._python("-m", "pytest", *options, *tests)
         seconds = time.monotonic() - begin
@@ -139,7 +148,7 @@ class Copy:
         if killer is not None:
             return Outcome(status="failed", test=killer[1], seconds=seconds)
         status = "hung"
-        if seconds > SECONDS_A_MUTANT:
+        if seconds > self.seconds:
             status = "unfinished"
         return Outcome(status=status, test="", seconds=seconds)
 
@@ -155,7 +164,7 @@ class Copy:
             start_new_session=True,
         )
         try:
-            out, error = process.communicate(timeout=SECONDS_A_MUTANT)
+            out, error = process.communicate(timeout=self.seconds)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             out, error = process.communicate()
@@ -202,15 +211,21 @@ def nearest_tests(root: Path, name: str, function: str = "") -> list[str]:
 
     A file ranks by the imports between it and the module, by their names and folders, by its
     mention of the function or its class, and higher among the tests of the module's package.
-    Tests of whole commands come last, unless they import the module themselves.
+    Tests of whole commands come last, unless they import the module themselves. Where no test is
+    near, the nearest of the far ones count.
     """
     module, folder = _dotted(name), _folder_of_tests(name)
     package = "/".join(folder.split("/")[:3])  # such as tests/unit/dataset
     ranks = {}
-    for test, imported in _imports_of_tests(root).items():
-        distance, likeness = _distance(root, imported, module), _likeness(test, name)
-        is_far = distance > FARTHEST and likeness < ALIKE
-        if is_far or test.startswith(LEFT_OUT):
+    distances = {
+        test: _distance(root, imported, module)
+        for test, imported in _imports_of_tests(root).items()
+        if not test.startswith(LEFT_OUT)
+    }
+    farthest = max(FARTHEST, min(distances.values(), default=FARTHEST))
+    for test, distance in distances.items():
+        likeness = _likeness(test, name)
+        if distance > min(farthest, MOST_IMPORTS) and likeness < ALIKE:
             continue
         is_late = test.startswith(COMMANDS) and folder != COMMANDS and distance > 1
         nearness = likeness + 1.0 / distance
@@ -282,7 +297,7 @@ def _distance(root: Path, imported: frozenset[str], module: str) -> int:
     """Imports from a test to a module; 1 if it imports the module itself."""
     modules = _imports_of_modules(root)
     front, seen = set(imported), set(imported)
-    for distance in range(1, FARTHEST + 1):
+    for distance in range(1, MOST_IMPORTS + 1):
         if module in front:
             return distance
         front = {
@@ -292,14 +307,19 @@ def _distance(root: Path, imported: frozenset[str], module: str) -> int:
             if other not in seen
         }
         seen |= front
-    return FARTHEST + 1
+    return MOST_IMPORTS + 1
 
 
 @cache
 def _imports(path: Path) -> frozenset[str]:
-    """Dotted names that a file imports, and those that may be modules of what it imports."""
+    """Dotted names that a file imports, and those that may be modules of what it imports.
+
+    Names in its texts count too: a child process, or a table of commands, imports by them.
+    """
     names = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            names |= set(NAMED.findall(node.value))
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         if isinstance(node, ast.ImportFrom) and node.module:

@@ -1,8 +1,8 @@
 """Small changes of the meaning of Python source: operators, their sites, the changed text.
 
 A site is one expression or statement that one operator changes. Left out are docstrings, other
-texts, annotations, raised errors, assertions, decorators and ``__repr__``. The changed expression
-replaces the original in the text; all other lines stay.
+texts, annotations, raised errors, assertions, decorators (but those of caches) and ``__repr__``.
+The changed expression replaces the original in the text; all other lines stay.
 """
 
 from __future__ import annotations
@@ -11,60 +11,11 @@ import ast
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
-    ast.Lt: ast.GtE,
-    ast.LtE: ast.Gt,
-    ast.Gt: ast.LtE,
-    ast.GtE: ast.Lt,
-    ast.Eq: ast.NotEq,
-    ast.NotEq: ast.Eq,
-    ast.In: ast.NotIn,
-    ast.NotIn: ast.In,
-    ast.Is: ast.IsNot,
-    ast.IsNot: ast.Is,
-}
-BOUNDARIES: dict[type[ast.cmpop], type[ast.cmpop]] = {
-    ast.Lt: ast.LtE,
-    ast.LtE: ast.Lt,
-    ast.Gt: ast.GtE,
-    ast.GtE: ast.Gt,
-}
-ARITHMETIC: dict[type[ast.operator], type[ast.operator]] = {
-    ast.Add: ast.Sub,
-    ast.Sub: ast.Add,
-    ast.Mult: ast.Div,
-    ast.Div: ast.Mult,
-    ast.FloorDiv: ast.Mult,
-    ast.Mod: ast.Add,
-    ast.Pow: ast.Mult,
-}
-CONNECTIVES: dict[type[ast.boolop], type[ast.boolop]] = {
-    ast.And: ast.Or,
-    ast.Or: ast.And,
-}
-FUNCTIONS = {
-    "sin": "cos",
-    "cos": "sin",
-    "min": "max",
-    "max": "min",
-    "minimum": "maximum",
-    "maximum": "minimum",
-    "argmin": "argmax",
-    "argmax": "argmin",
-    "floor": "ceil",
-    "ceil": "floor",
-    "any": "all",
-    "all": "any",
-    "mean": "sum",
-    "sum": "mean",
-    "zeros": "ones",
-    "ones": "zeros",
-    "zeros_like": "ones_like",
-    "ones_like": "zeros_like",
-}
-BUILT_IN = ("min", "max", "any", "all")
-AXES = {0: 1, 1: 0, -1: 0}
-ZEROED = ("Array", "FloatArray", "float", "int")
+from benchmarks import _call_changes as calls
+from benchmarks import _expression_changes as expressions
+from benchmarks import _place_changes as places
+from benchmarks._place_changes import Edit, Edits
+
 HIDDEN_FUNCTIONS = ("__repr__", "__str__")
 HIDDEN = (ast.Raise, ast.Assert, ast.JoinedStr, ast.Import, ast.ImportFrom)
 
@@ -93,158 +44,29 @@ class Site:
     mutated: str
 
 
-Changed = Iterator[ast.AST]
-
-
-def _operands_hold_text(node: ast.BinOp) -> bool:
-    """True for the joining of texts and lists, which is no arithmetic."""
-    literal = (ast.JoinedStr, ast.List, ast.Tuple, ast.ListComp)
-    for part in (node.left, node.right):
-        is_text = isinstance(part, ast.Constant) and isinstance(part.value, str)
-        if is_text or isinstance(part, literal):
-            return True
-    return False
-
-
-def _with_comparison(
-    node: ast.AST, table: dict[type[ast.cmpop], type[ast.cmpop]]
-) -> Changed:
-    if isinstance(node, ast.Compare) and len(node.ops) == 1:
-        other = table.get(type(node.ops[0]))
-        if other is not None:
-            yield ast.Compare(node.left, [other()], node.comparators)
-
-
-def comparison(node: ast.AST, _: ast.FunctionDef | None) -> Changed:
-    """The opposite comparison."""
-    return _with_comparison(node, COMPARISONS)
-
-
-def boundary(node: ast.AST, _: ast.FunctionDef | None) -> Changed:
-    """The same order, with the limit on the other side."""
-    return _with_comparison(node, BOUNDARIES)
-
-
-def _other_operation(node: ast.BinOp) -> Changed:
-    other = ARITHMETIC.get(type(node.op))
-    if other is not None and not _operands_hold_text(node):
-        yield ast.BinOp(node.left, other(), node.right)
-
-
-def arithmetic(node: ast.AST, _: ast.FunctionDef | None) -> Changed:
-    """Another operation on two numbers, in an expression or an assignment."""
-    if isinstance(node, ast.BinOp):
-        yield from _other_operation(node)
-    if isinstance(node, ast.AugAssign) and type(node.op) in ARITHMETIC:
-        yield ast.AugAssign(node.target, ARITHMETIC[type(node.op)](), node.value)
-
-
-def constant(node: ast.AST, _: ast.FunctionDef | None) -> Changed:
-    """Another truth value, the next integer, or a number of twice the size."""
-    if not isinstance(node, ast.Constant):
-        return
-    if isinstance(node.value, bool):
-        yield ast.Constant(not node.value)
-    elif isinstance(node.value, int):
-        yield ast.Constant(node.value + 1)
-    elif isinstance(node.value, float):
-        yield ast.Constant(2.0 * node.value or 1.0)
-
-
-def negation(node: ast.AST, _: ast.FunctionDef | None) -> Changed:
-    """The opposite condition: ``not`` dropped."""
-    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
-        yield node.operand
-
-
-def connective(node: ast.AST, _: ast.FunctionDef | None) -> Changed:
-    """``or`` for ``and``, and the other way round."""
-    if isinstance(node, ast.BoolOp):
-        yield ast.BoolOp(CONNECTIVES[type(node.op)](), node.values)
-
-
-def sign(node: ast.AST, _: ast.FunctionDef | None) -> Changed:
-    """A number without its minus."""
-    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-        yield node.operand
-
-
-def function(node: ast.AST, _: ast.FunctionDef | None) -> Changed:
-    """Another function of the same arguments, such as the cosine for the sine."""
-    if not isinstance(node, ast.Call):
-        return
-    called = node.func
-    if isinstance(called, ast.Name) and called.id in BUILT_IN:
-        name = ast.Name(FUNCTIONS[called.id])
-        yield ast.Call(name, node.args, node.keywords)
-    if isinstance(called, ast.Attribute) and called.attr in FUNCTIONS:
-        attribute = ast.Attribute(called.value, FUNCTIONS[called.attr])
-        yield ast.Call(attribute, node.args, node.keywords)
-
-
-def axis(node: ast.AST, _: ast.FunctionDef | None) -> Changed:
-    """Another axis of an array."""
-    if not isinstance(node, ast.Call):
-        return
-    for index, keyword in enumerate(node.keywords):
-        if keyword.arg != "axis":
-            continue
-        try:
-            given = ast.literal_eval(keyword.value)
-        except ValueError:
-            continue
-        if given in AXES:
-            keywords = list(node.keywords)
-            keywords[index] = ast.keyword("axis", ast.Constant(AXES[given]))
-            yield ast.Call(node.func, node.args, keywords)
-
-
-def arguments(node: ast.AST, around: ast.FunctionDef | None) -> Changed:
-    """Two neighbouring arguments exchanged: parameters of one type of the function around."""
-    if not isinstance(node, ast.Call) or around is None:
-        return
-    parameters = (*around.args.args, *around.args.kwonlyargs)
-    types = {
-        parameter.arg: ast.unparse(parameter.annotation)
-        for parameter in parameters
-        if parameter.annotation is not None
-    }
-    for index in range(len(node.args) - 1):
-        first, second = node.args[index : index + 2]
-        if not (isinstance(first, ast.Name) and isinstance(second, ast.Name)):
-            continue
-        type_of_first = types.get(first.id)
-        if type_of_first is not None and type_of_first == types.get(second.id):
-            swapped = [*node.args[:index], second, first, *node.args[index + 2 :]]
-            yield ast.Call(node.func, swapped, node.keywords)
-
-
-def result(node: ast.AST, around: ast.FunctionDef | None) -> Changed:
-    """A neutral result, zero or false, by the annotation of the function."""
-    if not isinstance(node, ast.Return) or node.value is None or around is None:
-        return
-    if around.returns is None or isinstance(node.value, ast.Constant):
-        return
-    annotation = ast.unparse(around.returns)
-    if annotation == "bool":
-        yield ast.Return(ast.Constant(False))
-    if annotation in ZEROED:
-        yield ast.Return(ast.BinOp(ast.Constant(0), ast.Mult(), node.value))
-
-
-OPERATORS: dict[str, Callable[[ast.AST, ast.FunctionDef | None], Changed]] = {
-    "comparison": comparison,
-    "boundary": boundary,
-    "arithmetic": arithmetic,
-    "constant": constant,
-    "negation": negation,
-    "connective": connective,
-    "sign": sign,
-    "function": function,
-    "axis": axis,
-    "arguments": arguments,
-    "result": result,
+NODES: dict[str, Callable[[ast.AST, ast.FunctionDef | None], Iterator[ast.AST]]] = {
+    "comparison": expressions.comparison,
+    "boundary": expressions.boundary,
+    "arithmetic": expressions.arithmetic,
+    "constant": expressions.constant,
+    "negation": expressions.negation,
+    "connective": expressions.connective,
+    "sign": expressions.sign,
+    "function": expressions.function,
+    "result": expressions.result,
+    "axis": calls.axis,
+    "arguments": calls.arguments,
+    "keyword": calls.keyword,
+    "slice": calls.slice_bound,
+    "unit": calls.unit,
 }
+PLACES: dict[str, Callable[[ast.AST, ast.FunctionDef | None], Edits]] = {
+    "order": places.order,
+    "cache key": places.cache_key,
+}
+OPERATORS = (*NODES, *PLACES)
+# the kinds of bugs that others found in the tests of 0.16.0
+OF_OTHERS = ("arguments", "keyword", "slice", "order", "unit", "axis", "cache key")
 
 
 class _Sites:
@@ -264,11 +86,11 @@ class _Sites:
             return
         if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
             return
-        yield from self._changes(node, names, around)
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             if node.name in HIDDEN_FUNCTIONS:
                 return
             names = (*names, node.name)
+        yield from self._changes(node, names, around)
         if isinstance(node, ast.FunctionDef):
             around = node
         for child in _meaningful(node):
@@ -277,25 +99,33 @@ class _Sites:
     def _changes(
         self, node: ast.AST, names: tuple[str, ...], around: ast.FunctionDef | None
     ) -> Iterator[Site]:
-        for operator, changes in OPERATORS.items():
+        function = ".".join(names)
+        for operator, changes in NODES.items():
             for changed in changes(node, around):
                 assert isinstance(node, ast.expr | ast.stmt)
-                yield self._site(operator, node, changed, ".".join(names))
+                text = ast.unparse(ast.fix_missing_locations(changed))
+                edit = Edit(first=node, last=node, text=text)
+                yield self._site(operator, edit, function)
+        for operator, edits in PLACES.items():
+            for edit in edits(node, around):
+                yield self._site(operator, edit, function)
 
-    def _site(
-        self, operator: str, node: ast.expr | ast.stmt, changed: ast.AST, function: str
-    ) -> Site:
-        assert node.end_lineno is not None
-        assert node.end_col_offset is not None
+    def _site(self, operator: str, edit: Edit, function: str) -> Site:
+        first, last = edit.first, edit.last
+        assert last.end_lineno is not None
+        assert last.end_col_offset is not None
+        original = ast.unparse(first)
+        if last is not first:
+            original += f"; {ast.unparse(last)}"
         return Site(
             operator=operator,
             function=function,
-            line=node.lineno,
-            text=self.lines[node.lineno - 1].decode().strip(),
-            start=self.begins[node.lineno - 1] + node.col_offset,
-            end=self.begins[node.end_lineno - 1] + node.end_col_offset,
-            original=ast.unparse(node),
-            mutated=ast.unparse(ast.fix_missing_locations(changed)),
+            line=first.lineno,
+            text=self.lines[first.lineno - 1].decode().strip(),
+            start=self.begins[first.lineno - 1] + first.col_offset,
+            end=self.begins[last.end_lineno - 1] + last.end_col_offset,
+            original=original,
+            mutated=edit.text,
         )
 
 
@@ -328,7 +158,7 @@ def mutated_source(source: str, site: Site) -> str:
     """The source text with the change of a site."""
     content = source.encode()
     change = site.mutated
-    if site.operator != "result" and not _is_statement(change):
+    if _is_expression(change):
         change = f"({change})"
     changed = content[: site.start] + change.encode() + content[site.end :]
     text = changed.decode()
@@ -337,6 +167,7 @@ def mutated_source(source: str, site: Site) -> str:
     return text
 
 
-def _is_statement(text: str) -> bool:
-    """True for an assignment in place, which takes no parentheses."""
-    return isinstance(ast.parse(text).body[0], ast.AugAssign)
+def _is_expression(text: str) -> bool:
+    """True for one expression, which parentheses leave as it is."""
+    statements = ast.parse(text).body
+    return len(statements) == 1 and isinstance(statements[0], ast.Expr)
