@@ -77,7 +77,7 @@ class Outcome:
 class Copy:
     """Copy of the tree of a project, in ``folder``; ``root`` is the project's own folder.
 
-    ``seconds_a_test`` and ``seconds`` are the limits of one test and of all for one mutant.
+    ``seconds_a_test`` and ``seconds`` are the limits of one test and of one call of pytest.
     """
 
     root: Path

@@ -145,3 +145,11 @@ def test_a_line_is_read_where_it_passes():
         [-1, -1, 0, 1, 2, 3, 4],
         atol=1e-12,
     )
+
+
+def test_a_line_counts_from_where_it_passes_on():
+    lines = np.array([0.0, 1.5, 3.0, 4.5])
+    read = Disc(index=0.0, line_angles=lines).read(lines, quantised=True)
+    assert_allclose(read / (np.pi / 2), [0, 1, 2, 3], atol=1e-12)
+    before = Disc(index=0.0, line_angles=lines).read(lines - 1e-9, quantised=True)
+    assert_allclose(before / (np.pi / 2), [-1, 0, 1, 2], atol=1e-12)

@@ -10,6 +10,8 @@ from dataset_samples import CLASSES, build, make_plan
 from numpy.testing import assert_allclose
 
 from gensig.dataset.cards.card import card_text, front_matter
+from gensig.dataset.cards.croissant import _meaning
+from gensig.dataset.columns import COLUMNS
 from gensig.dataset.reader import open_dataset
 from gensig.dataset.storage.atomic import sha256_file
 
@@ -64,6 +66,16 @@ def test_croissant_is_valid_and_gives_the_records(folder, plan):
         [row["records/params.crack_depth_mm"] for row in rows], dtype=float
     )
     assert_allclose(depths, plan.columns["params/crack_depth_mm"], rtol=1e-12, atol=0)
+
+
+def test_a_column_has_its_meaning_and_its_unit_if_it_has_one():
+    units = {column.unit for column in COLUMNS.values()}
+    assert {"", "1", "N m"} <= units
+    for name, column in COLUMNS.items():
+        expected = column.description
+        if column.unit not in ("", "1"):
+            expected = f"{column.description} ({column.unit})"
+        assert _meaning(name) == expected
 
 
 def test_the_validator_would_find_a_mistake(folder):
