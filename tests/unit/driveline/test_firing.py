@@ -130,3 +130,17 @@ def test_layouts_that_cannot_be_are_refused(change, message):
     with pytest.raises(ConfigError, match=re.escape(message)) as caught:
         replace(V20, **change)
     assert "\n" not in str(caught.value)
+
+
+def test_two_throws_are_one_within_a_hundredth_of_a_degree():
+    def twin(degrees):
+        return Layout(
+            banks=("A",),
+            bank_angles=(0.0,),
+            throw_angles=(0.0, np.radians(degrees)),
+            firing_order=("A1", "A2"),
+        )
+
+    assert_allclose(gaps(twin(0.005)), 360.0, atol=0.01)
+    with pytest.raises(ConfigError, match="takes 360 degrees"):
+        twin(0.1)

@@ -1,5 +1,6 @@
 """Data cards, read by the Croissant validator, by Hugging Face and by people."""
 
+import datetime
 import json
 
 import mlcroissant
@@ -119,6 +120,14 @@ def test_responsible_ai_fields_state_facts_and_caveats(tmp_path):
     assert all(name in content["description"] for name in CLASSES)
     metadata = mlcroissant.Dataset(jsonld=folder / "croissant.json").metadata
     assert metadata.data_limitations is not None
+
+
+def test_it_is_published_on_the_day_it_was_made(folder):
+    content = json.loads((folder / "croissant.json").read_text(encoding="utf-8"))
+    with open_dataset(folder) as data:
+        made = data.manifest.environment["created"]
+    day = datetime.date.fromisoformat(content["datePublished"])
+    assert day == datetime.datetime.fromisoformat(made).date()
 
 
 def test_card_is_the_text_written(folder):
