@@ -12,13 +12,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 
 from benchmarks import _end_to_end, _rates
 from benchmarks._measure import begin, print_figures, write_json
 from benchmarks._peak import roof
 from benchmarks._ross_time import stored_rate
 from gensig.driveline.side_by_side.line_integration import line_core
-from gensig.dynamics._vector import LANES, PRECISIONS
+from gensig.dynamics._vector import LANES, PRECISIONS, n_lanes
 from gensig.dynamics.backends.nystroem.method import THREE_PAIRS as NYSTROEM_CORE
 
 RECORD = "import gensig; gensig.load_system('solver.precision={}').simulate()"
@@ -48,7 +49,7 @@ GOALS = {
 }
 
 
-def kernels(runs: int) -> dict[str, float]:
+def kernels(runs: int, precisions: Sequence[str] = PRECISIONS) -> dict[str, float]:
     """Rates of the integrators alone."""
     lanes = _rates.machines()
     eight = lanes[:LANES]
@@ -59,14 +60,17 @@ def kernels(runs: int) -> dict[str, float]:
     works["compiled core float64 x5, one of the lanes in use"] = _rates.kernel(
         eight[:1], 5
     )
-    works[KERNEL.format("float32")] = _rates.kernel(lanes, 5, "float32")
-    for precision, machines in (("float64", eight), ("float32", lanes)):
+    if "float32" in precisions:
+        works[KERNEL.format("float32")] = _rates.kernel(lanes, 5, "float32")
+    for precision in precisions:
+        machines = lanes[: n_lanes(precision)]
         works[NYSTROEM.format(precision)] = _rates.kernel(
             machines, 5, precision, NYSTROEM_CORE
         )
     boxes = _rates.two_stage_boxes()
     core = line_core(boxes[0])
-    for precision, machines in (("float64", boxes[:LANES]), ("float32", boxes)):
+    for precision in precisions:
+        machines = boxes[: n_lanes(precision)]
         works[TWO_STAGE.format(precision)] = _rates.kernel(machines, 5, precision, core)
     works[SCALAR] = _rates.scalar(eight, 5)
     works |= _rates.scipy_works(eight[0])
@@ -91,8 +95,8 @@ def same_law() -> dict[str, float]:
     }
 
 
-def start_up(runs: int) -> dict[str, float]:
-    """Wall seconds of fresh processes."""
+def start_up(runs: int, *, quick: bool) -> dict[str, float]:
+    """Wall seconds of fresh processes; those that simulate are left out of a quick run."""
 
     def wall(code: str, **variables: str) -> float:
         start = time.perf_counter()
@@ -104,6 +108,10 @@ def start_up(runs: int) -> dict[str, float]:
     result = {
         "the interpreter alone": min(wall("pass") for _ in range(runs)),
         "import gensig": min(wall("import gensig") for _ in range(runs)),
+    }
+    if quick:
+        return result
+    result |= {
         "first record of 1 s, compiled code cached": min(
             wall(RECORD.format("float64")) for _ in range(runs)
         ),
@@ -121,10 +129,10 @@ def ratios(
     """Ratios of rates, which compare between machines."""
     result = {
         f"kernel {precision} over scalar Numba": rates[KERNEL.format(precision)]
-        for precision in PRECISIONS
+        for precision in ends
     }
     result = {name: value / rates[SCALAR] for name, value in result.items()}
-    for precision in PRECISIONS:
+    for precision in ends:
         pair = rates[NYSTROEM.format(precision)]
         result[f"two-evaluation core over scalar Numba, {precision}"] = (
             pair / rates[SCALAR]
@@ -140,7 +148,8 @@ def ratios(
             pair / box
         )
     end = ends["float64"][RECORDS]
-    result["float32 over float64, end to end"] = ends["float32"][RECORDS] / end
+    if "float32" in ends:
+        result["float32 over float64, end to end"] = ends["float32"][RECORDS] / end
     result["end to end over solve_ivp RK45, right-hand side compiled"] = (
         end / rates[RK45]
     )
@@ -183,21 +192,26 @@ def main() -> None:
             *([lambda value: f"{value / over:.4g} x scalar"] if over else []),
         )
 
+    precisions, size = PRECISIONS, _end_to_end.WHOLE
+    if arguments.quick:
+        precisions, size = ("float64",), _end_to_end.QUICK
     show("difference of scalar code and compiled core", same_law())
-    show(f"integrators, {PER_CORE}", kernels(arguments.runs))
+    show(f"integrators, {PER_CORE}", kernels(arguments.runs, precisions))
     show(
         "roof of the compiled core: its additions and multiplications alone",
         roof(8 * arguments.runs, 5),
     )
     rates, ends = sections[f"integrators, {PER_CORE}"], {}
-    for precision in PRECISIONS:
-        values = _end_to_end.by_stage(precision, arguments.runs)
-        ends[precision] = values | _end_to_end.wall_rates(precision, 2, arguments.runs)
+    for precision in precisions:
+        values = _end_to_end.by_stage(precision, arguments.runs, size=size)
+        ends[precision] = values | _end_to_end.wall_rates(
+            precision, 2, arguments.runs, size
+        )
         show(
             f"gensig generate, {precision}, records of 1 s and four channels",
             ends[precision],
         )
-    show("start-up, wall s", start_up(arguments.runs))
+    show("start-up, wall s", start_up(arguments.runs, quick=arguments.quick))
     sections["ratios"] = ratios(rates, ends)
     print("\nratios (goal)")
     for name, value in sections["ratios"].items():

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import tempfile
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -32,8 +33,20 @@ from gensig.systems import spur_pair
 # of the kernel's rate, where that would be the same
 RECORDING_SHARE = "share of the records' own integration"
 SHARD = 32  # records, as in the experiment
-# of the plan; with a reference for every four of them, they fill the shards
-FIVE_SHARDS, TEN_SHARDS = 128, 256
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Size:
+    """Records planned for one process and for several, and further options of the data set."""
+
+    one: int
+    several: int
+    words: tuple[str, ...] = ()
+
+
+# with a reference for every four records, they fill five and ten shards
+WHOLE = Size(one=128, several=256)
+QUICK = Size(one=8, several=96, words=("operating.duration_s=0.05",))
 
 
 def data_set(precision: str, n_planned: int, *words: str) -> dict[str, Any]:
@@ -50,12 +63,14 @@ def data_set(precision: str, n_planned: int, *words: str) -> dict[str, Any]:
     return config
 
 
-def by_stage(precision: str, runs: int, *words: str) -> dict[str, float]:
+def by_stage(
+    precision: str, runs: int, *words: str, size: Size = WHOLE
+) -> dict[str, float]:
     """CPU milliseconds of a record by stage and in all, and rates of one process.
 
     The best of several runs; ``words`` are further options of the data set.
     """
-    config = data_set(precision, FIVE_SHARDS, *words)
+    config = data_set(precision, size.one, *size.words, *words)
     n_samples = round(
         config["operating"]["duration_s"] * config["sensing"]["sampling_rate_hz"]
     )
@@ -105,12 +120,15 @@ def wall_name(workers: int) -> str:
     )
 
 
-def wall_rates(precision: str, workers: int, runs: int) -> dict[str, float]:
+def wall_rates(
+    precision: str, workers: int, runs: int, size: Size = WHOLE
+) -> dict[str, float]:
     """Records a second of wall time.
 
     Once every worker has finished its first shard, and of the whole data set.
     """
-    config, whole, running = data_set(precision, TEN_SHARDS), [], []
+    config = data_set(precision, size.several, *size.words)
+    whole, running = [], []
     for _ in range(runs):
         with tempfile.TemporaryDirectory() as folder:
             begin_folder(config, [], Path(folder) / "set")

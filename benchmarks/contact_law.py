@@ -9,17 +9,20 @@ with a fault. Prints Markdown tables.
 
 from __future__ import annotations
 
+import argparse
 import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from benchmarks._contact_law_motion import Mesh, mesh_at_loads, motion, static_approach
+from benchmarks._measure import add_quick
 from benchmarks._mesh_numbers import mesh_numbers
 from gensig.dynamics._vector import LANES
 from gensig.dynamics.decimation import decimator
@@ -402,6 +405,9 @@ def table(head: str, rows: Iterator[Sequence[str]]) -> None:
 
 def main() -> None:
     """Print every table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    add_quick(parser)
+    n_rows = 1 if parser.parse_args().quick else None
     begun = time.perf_counter()
     print(
         "Static, secant and full law: approach in um, tangent stiffness in 1e8 N/m, mesh "
@@ -409,7 +415,7 @@ def main() -> None:
     )
     table(
         "| N m | fault | mean | peak to peak | mean stiffness | % | resonance | % |",
-        static_rows(),
+        islice(static_rows(), n_rows),
     )
     print(
         f"{CHANNEL} in m/s2, secant and full law; changes from the secant; difference "
@@ -419,7 +425,7 @@ def main() -> None:
         "| N m | fault | RMS | % | mesh harmonics 1..6, % | difference, once shifted, % | "
         "shift, us |"
     )
-    table(head, dynamic_rows())
+    table(head, islice(dynamic_rows(), n_rows))
     print(
         f"Differences that should be none; records at {TORQUES} N m, finer ones at "
         f"{TORQUES[1::2]}, the rest at 20\n"
@@ -428,7 +434,7 @@ def main() -> None:
         "| fault | secant, gensig's record | static approach | stiffness | linear "
         "contact: full, secant | "
         "full, 8 and 16 steps a sample | face shared anew, 41 and 81 loads |",
-        check_rows(),
+        islice(check_rows(), n_rows),
     )
     print(f"{time.perf_counter() - begun:.0f} s")
 

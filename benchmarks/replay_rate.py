@@ -85,10 +85,14 @@ def replayed(stream: Any, transform: Any, runs: int) -> dict[str, float]:
 def main() -> None:
     """Measure and print."""
     arguments, named, _ = begin("benchmarks.replay_rate", __doc__ or "")
-    stream = gensig.stream("experiment=quickstart")
-    part = stream.take(range(N_TIMED))
+    n_timed, words, transforms = N_TIMED, (), TRANSFORMS
+    if arguments.quick:
+        n_timed, words = 8, ("plan.n_records=8", "operating.duration_s=0.1")
+        transforms = {"crop alone": None}
+    stream = gensig.stream("experiment=quickstart", *words)
+    part = stream.take(range(n_timed))
     list(part)  # compiles
-    spent = least(lambda: list(part), arguments.runs) / N_TIMED
+    spent = least(lambda: list(part), arguments.runs) / n_timed
     sections = {
         "one process": {
             "CPU s a new record": spent,
@@ -98,7 +102,7 @@ def main() -> None:
     }
     for section, values in sections.items():
         print_figures(section, values)
-    for name, transform in TRANSFORMS.items():
+    for name, transform in transforms.items():
         section = f"ReplayStream, reuse {REUSE}, {N_WORKERS} workers: {name}"
         sections[section] = replayed(stream, transform, arguments.runs)
         print_figures(section, sections[section])

@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -35,8 +35,24 @@ from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run, Start
 
-DURATIONS = (0.05, 0.16, 0.5, 1.6, 5.0, 16.0, 50.0)  # s
-COUNTS = (8, 80, 800, 8000)  # records
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sizes:
+    """Durations in s, records of short sets and of long ones, and teeth that are gone through."""
+
+    durations: tuple[float, ...]
+    counts: tuple[int, ...]
+    long_counts: tuple[int, ...]
+    teeth: tuple[int, ...]
+
+
+WHOLE = Sizes(
+    durations=(0.05, 0.16, 0.5, 1.6, 5.0, 16.0, 50.0),
+    counts=(8, 80, 800, 8000),
+    long_counts=(80, 800, 8000),
+    teeth=(1, 2, 4, 8, 16, 23),
+)
+QUICK = Sizes(durations=(0.05, 0.1), counts=(8,), long_counts=(8,), teeth=(1, 2))
 QUICKSTART = ("experiment=quickstart", "dataset.records_per_shard=null")
 # without twins, whose number depends on how records fall into shards, and with little settling
 SHORT = (
@@ -46,8 +62,7 @@ SHORT = (
     "sensing.snr_reference=record",
     "plan.n_units=4",
 )
-LONG, LONG_COUNTS = ("operating.duration_s=1",), (80, 800, 8000)
-TEETH = (1, 2, 4, 8, 16, 23)
+LONG = ("operating.duration_s=1",)
 ROTORS = {6: (), 7: ("system.motor.inertia_kg_m2=1e-3",)}
 ROTORS[8] = (*ROTORS[7], "system.load.inertia_kg_m2=1e-2")
 # a process of its own makes a data set, or of a planned one the first shard, as a worker does
@@ -137,12 +152,12 @@ def simulate(runs: Sequence[Run]) -> None:
             raise record
 
 
-def against_duration(runs: int) -> dict[str, float]:
+def against_duration(runs: int, sizes: Sizes) -> dict[str, float]:
     """CPU seconds of a group by duration, and how far from a straight line with a constant for the
     settling.
     """
     group, works = side_by_side(), {}
-    for duration in DURATIONS:
+    for duration in sizes.durations:
         operating = replace(group[0].system.operating, duration=duration)
         timed = [
             replace(run, system=replace(run.system, operating=operating))
@@ -151,7 +166,10 @@ def against_duration(runs: int) -> dict[str, float]:
         works[f"{duration:g} s"] = partial(simulate, timed)
     simulate(group)
     result = in_turn(works, runs)
-    return {**result, **straight("second", DURATIONS, list(result.values()), LANES)}
+    return {
+        **result,
+        **straight("second", sizes.durations, list(result.values()), LANES),
+    }
 
 
 def straight(
@@ -172,12 +190,12 @@ def straight(
     }
 
 
-def against_number(runs: int) -> dict[str, float]:
+def against_number(runs: int, sizes: Sizes) -> dict[str, float]:
     """CPU milliseconds a record by the number of records of a data set, made by one process from
     plan to index.
     """
     result = []
-    for n_records in COUNTS:
+    for n_records in sizes.counts:
         told = [
             alone(make_set, str(n_records), *QUICKSTART, *SHORT)
             for _ in range(runs if n_records < 1000 else 1)
@@ -185,17 +203,17 @@ def against_number(runs: int) -> dict[str, float]:
         result.append(min(spent for spent, _ in told))
     values = {
         f"{n} short records": spent / n * 1e3
-        for n, spent in zip(COUNTS, result, strict=True)
+        for n, spent in zip(sizes.counts, result, strict=True)
     }
-    return {**values, **straight("record", COUNTS, result)}
+    return {**values, **straight("record", sizes.counts, result)}
 
 
-def memory(_runs: int) -> dict[str, float]:
+def memory(_runs: int, sizes: Sizes) -> dict[str, float]:
     """Peak memory in MB of the process that plans, and of a worker that makes one whole shard, by
     number of records.
     """
     result = {}
-    for n_records in LONG_COUNTS:
+    for n_records in sizes.long_counts:
         with tempfile.TemporaryDirectory() as folder:
             out = str(Path(folder) / "set")
             planning, working = (
@@ -210,7 +228,7 @@ def memory(_runs: int) -> dict[str, float]:
     return result
 
 
-def against_teeth(runs: int) -> tuple[dict[str, float], dict[str, float]]:
+def against_teeth(runs: int, sizes: Sizes) -> tuple[dict[str, float], dict[str, float]]:
     """CPU milliseconds of a table, and of a record without it, by the number of pitted pinion
     teeth.
     """
@@ -221,7 +239,7 @@ def against_teeth(runs: int) -> tuple[dict[str, float], dict[str, float]]:
         sound_load.cache_clear()
         pair_dynamics(run)
 
-    for n_teeth in TEETH:
+    for n_teeth in sizes.teeth:
         teeth = list(range(n_teeth))
         group = side_by_side(
             "operating.duration_s=0.2",
@@ -237,11 +255,11 @@ def against_teeth(runs: int) -> tuple[dict[str, float], dict[str, float]]:
     result = {
         name: value / LANES * 1e3 for name, value in in_turn(motions, runs).items()
     }
-    line = straight("tooth", TEETH, list(spent.values()))
+    line = straight("tooth", sizes.teeth, list(spent.values()))
     return {**{name: value * 1e3 for name, value in spent.items()}, **line}, result
 
 
-def against_freedom(runs: int) -> dict[str, float]:
+def against_freedom(runs: int, _sizes: Sizes) -> dict[str, float]:
     """CPU milliseconds a record of 1 s by degrees of freedom: with a motor, and with a load too."""
     works = {}
     for n_dof, words in ROTORS.items():
@@ -259,12 +277,17 @@ def main() -> None:
     """Measure and print."""
     arguments, named, begun = begin("benchmarks.scaling", __doc__ or "")
     sections: dict[str, dict[str, float]] = {}
+    sizes = WHOLE
+    if arguments.quick:
+        sizes = QUICK
 
     def show(
-        measure: Callable[[int], dict[str, float] | tuple[dict[str, float], ...]],
+        measure: Callable[
+            [int, Sizes], dict[str, float] | tuple[dict[str, float], ...]
+        ],
         *titles: str,
     ) -> None:
-        result = measure(arguments.runs)
+        result = measure(arguments.runs, sizes)
         for title, values in zip(
             titles, result if isinstance(result, tuple) else (result,), strict=True
         ):

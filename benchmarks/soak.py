@@ -297,7 +297,7 @@ PARTS: dict[str, Callable[[Path, int], bool]] = {
 
 def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("parts", nargs="*", choices=[*PARTS, []], default=list(PARTS))
+    parser.add_argument("parts", nargs="*", choices=[*PARTS, []], default=[])
     parser.add_argument("--records", type=int, default=100_000)
     arguments = parser.parse_args(argv)
     good = True

@@ -22,11 +22,14 @@ RK45 = "solve_ivp RK45, right-hand side compiled"
 def main() -> None:
     """Measure and print one column for each method and precision."""
     arguments, named, begun = begin("benchmarks.stages", __doc__ or "")
+    kinds, size = KINDS, _end_to_end.WHOLE
+    if arguments.quick:
+        kinds, size = KINDS[:2], _end_to_end.QUICK
     columns = {
         f"{backend} {precision}": _end_to_end.by_stage(
-            precision, arguments.runs, f"solver.backend={backend}"
+            precision, arguments.runs, f"solver.backend={backend}", size=size
         )
-        for backend, precision in KINDS
+        for backend, precision in kinds
     }
     print("\n" + " " * 62 + "".join(f"{name:>22}" for name in columns))
     for row in next(iter(columns.values())):

@@ -14,12 +14,13 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 
 import gensig
 from benchmarks import _rates
 from benchmarks._measure import begin, write_json
 from gensig.driveline.side_by_side.line_integration import line_core
-from gensig.dynamics._vector import LANES
+from gensig.dynamics._vector import LANES, PRECISIONS, n_lanes
 from gensig.dynamics.backends.nystroem.method import THREE_PAIRS
 
 # name of a processor, as LLVM knows it; what is empty is this one
@@ -32,12 +33,13 @@ CHILD = "--child"
 SCALAR = "scalar Numba RK4 x5"
 
 
-def rates(runs: int) -> dict[str, float]:
+def rates(runs: int, precisions: Sequence[str] = PRECISIONS) -> dict[str, float]:
     """Rates of the cores and of scalar Numba in this process."""
     pairs, boxes = _rates.machines(), _rates.two_stage_boxes()
     box_core = line_core(boxes[0])
     works = {SCALAR: _rates.scalar(pairs[:LANES], 5)}
-    for precision, n in (("float64", LANES), ("float32", len(pairs))):
+    for precision in precisions:
+        n = n_lanes(precision)
         works[f"pair {precision} x5"] = _rates.kernel(
             pairs[:n], 5, precision, THREE_PAIRS
         )
@@ -81,8 +83,14 @@ def main() -> None:
         return
     arguments, named, begun = begin("benchmarks.vector_widths", __doc__ or "")
     figures, first = {}, ""
-    for name, target in TARGETS.items():
-        measured, bits = on(target, arguments.runs)
+    targets = TARGETS
+    if arguments.quick:
+        targets = {"this process": ""}
+    for name, target in targets.items():
+        if arguments.quick:
+            measured, bits = rates(arguments.runs, ("float64",)), digest()
+        else:
+            measured, bits = on(target, arguments.runs)
         first = first or bits
         figures[name] = measured
         same = "the same bits" if bits == first else "OTHER BITS"
