@@ -43,6 +43,7 @@ from gensig.errors import ConfigError, DatasetError
 
 if TYPE_CHECKING:
     from diagnose.data.inputs import NetworkInput
+    from diagnose.data.lives import Lives
     from diagnose.data.windows import Segments, Task
     from gensig.dataset.reader import Dataset
 
@@ -162,7 +163,7 @@ class StoredLife(StoredNetwork):
 
     def scores(self, task: Task, segments: Segments, part: str) -> Scores:
         """Scores by life, with the level and the intervals of the training."""
-        from diagnose.data.lives import kept_segments, lives_of
+        from diagnose.data.lives import kept_segments
         from diagnose.studies.life_jobs import LifePrediction
         from diagnose.studies.life_study import (
             below_bound,
@@ -173,8 +174,7 @@ class StoredLife(StoredNetwork):
         )
 
         facts, dataset, description = self.facts, task.dataset, self.description
-        lives = lives_of(task)
-        self._check_columns(dataset)
+        lives = self._lives(task)
         segments = kept_segments(segments, lives.name != "")
         if not lives.failed[segments.record].any():
             raise ConfigError(
@@ -182,8 +182,8 @@ class StoredLife(StoredNetwork):
             )
         columns = [np.asarray(dataset.column(name), dtype=float) for name in facts.told]
         windows = self.inputs().load(task, segments)
-        conditions = np.stack(columns, axis=1)
-        record, share = shares_of_records(self.model, windows, conditions)
+        told = np.stack(columns, axis=1)
+        record, share = shares_of_records(self.model, windows, told)
         require_finite(remaining_life=share)
         prediction = LifePrediction(
             protocol=description.protocol,
@@ -224,14 +224,18 @@ class StoredLife(StoredNetwork):
             write=write,
         )
 
-    def _check_columns(self, dataset: Dataset) -> None:
-        """Refuse a data set without a column that the network takes beside the signal."""
+    def _lives(self, task: Task) -> Lives:
+        """Lives of a data set, which must have the columns that the network takes."""
+        from diagnose.data.lives import lives_of
+
+        lives, dataset = lives_of(task), task.dataset
         for name in self.facts.told:
             if name not in dataset.column_names:
                 raise DatasetError(
                     f"{dataset.folder} does not fit the model, which is told {name}: "
                     "it has no such column"
                 )
+        return lives
 
     def lines(self, result: Content) -> list[str]:
         """Part, channels, every measure, and the coverage that was wanted."""

@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from gensig.units import is_number
-
 Reader = Callable[[str, Any], Any]  # name and value -> typed value, or ValueError
 
 MOST_CHANNELS, MOST_CLASSES, MOST_TEETH = 256, 1000, 5000
@@ -41,7 +39,7 @@ def number(low: float, high: float) -> Reader:
     """Reader of finite numbers within bounds, both included."""
 
     def read(name: str, value: Any) -> float:
-        if not is_number(value) or not low <= value <= high:
+        if type(value) not in (int, float) or not low <= value <= high:
             raise ValueError(
                 f"{name} {_shown(value)} is no number from {low:g} to {high:g}"
             )
