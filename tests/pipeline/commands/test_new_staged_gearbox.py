@@ -1,5 +1,6 @@
 """gensig new gearbox of several stages: tables that close, options that run as printed."""
 
+import csv
 import itertools
 import json
 import re
@@ -14,7 +15,7 @@ from numpy.testing import assert_allclose
 from gensig import open_dataset
 from gensig.cli import main
 from gensig.commands.new.data_sheet import DataSheet, gear_option
-from gensig.commands.new.line_tables import torsional_stiffness
+from gensig.commands.new.line_tables import shafting_table, torsional_stiffness
 from gensig.commands.new.stages import (
     StagedSheet,
     shaft_diameters,
@@ -42,6 +43,14 @@ def sheet(**changes):
 def test_one_stage_has_the_shafts_of_the_single_pair():
     single = sheet(teeth=((29, 100),), modules=(1.5,))
     assert shaft_diameters(single) == bores((29, 100), 1.5)
+
+
+def test_edges_lead_from_the_motor_to_the_load():
+    lines = shafting_table(sheet(), stage_options(sheet())).splitlines()
+    rows = csv.DictReader(line for line in lines if not line.startswith("#"))
+    edges = [(row["edge_from"], row["edge_to"]) for row in rows if row["edge_from"]]
+    assert edges == [(str(node), str(node + 1)) for node in range(1, len(edges) + 1)]
+    assert len(edges) == 7
 
 
 def test_a_stage_is_the_pair_of_its_own_speed_torque_and_bores():

@@ -251,3 +251,13 @@ def test_the_check_finds_what_is_on_two_sides():
     assert "'r999999' is not in the plan" in line
     twice = moved(leaky, 0, start_fraction=0.1)
     assert "given twice" in split_problems("random_window_leaky", twice, plan)[0]
+
+
+def test_every_record_has_its_own_windows_in_every_subset_of_the_leaky_split():
+    plan = random_plan(7, n_units=24, n_classes=4, n_records=384)
+    leaky = make_splits(plan, 0)["random_window_leaky"]
+    subset = leaky.subset.reshape(plan.n_records, -1)
+    counts = np.array([(subset == name).sum(axis=1) for name in SUBSETS])
+    assert np.all(counts[0] == 5)
+    assert {tuple(pair) for pair in counts[1:].T} == {(1, 2), (2, 1)}
+    assert len({tuple(row) for row in subset}) > 50

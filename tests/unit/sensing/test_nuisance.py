@@ -1,7 +1,7 @@
 """Nuisances by hand: orders, sizes, directions, what is drawn for whom, and bad input."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -295,3 +295,12 @@ def test_numbers_stay_within_their_limits(kind):
         for ends in ((low - 1, high), (high, low), (low, 2 * high), (low,)):
             with pytest.raises(ConfigError, match=rf"^{name}.* must be two ordered"):
                 replace(part, **{name: ends})
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_limit_of_an_angle_is_within_a_turn(kind):
+    (part,) = read_nuisances([PARTS[kind]])
+    angles = {each.name for each in fields(part) if each.metadata.get("unit") == "deg"}
+    for name in angles & (part.limits.keys() | part.ranges.keys()):
+        low, high = (part.limits | part.ranges)[name]
+        assert -math.tau <= low < high <= math.tau, name

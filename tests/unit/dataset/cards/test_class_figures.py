@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 from dataset_samples import ATTRIBUTES, build, make_plan, write_shard
 from matplotlib.image import imread
+from numpy.testing import assert_allclose
 
-from gensig.dataset.cards.class_figures import example_records, write_class_figures
+from gensig.dataset.cards.class_figures import (
+    _example,
+    example_records,
+    write_class_figures,
+)
 from gensig.dataset.folder.closing import finalize
 from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.folder.manifest import record_shard
@@ -49,6 +54,17 @@ def test_the_record_of_median_severity_stands_for_its_class(drawn):
         assert label[index] == number
         assert usable[index]
         assert severity[index] == np.sort(mine)[len(mine) // 2]
+
+
+def test_an_example_lasts_two_turns_in_ms_and_reaches_half_the_rate_in_khz(drawn):
+    with open_dataset(drawn) as data:
+        example = _example(data, 0, data.channel_names[0])
+        speed, rate = data.column("speed_rpm")[0], data.sampling_rate
+        shown = min(2.0 * 60.0 / speed, data.n_samples / rate)
+    step = example.time[1] - example.time[0]
+    assert_allclose(step, 1e3 / rate)
+    assert_allclose(example.time[-1] + step, 1e3 * shown, atol=step)
+    assert_allclose(example.frequency[-1], 0.5e-3 * rate)
 
 
 def test_the_bytes_depend_on_nobody_s_style(drawn, tmp_path):
