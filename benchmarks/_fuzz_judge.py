@@ -218,7 +218,7 @@ def verdicts(
                     noticed=noticed,
                     refused=refused,
                 )
-                seeds = range(seed + 1, seeds.stop)
+                seeds = seeds[seeds.index(seed) + 1 :]
                 if not len(seeds):
                     worker.join()
                     return
@@ -228,4 +228,4 @@ def verdicts(
         yield Verdict(
             seed=seeds[0], kind=kind, fault=fault, noticed=False, refused=False
         )
-        seeds = range(seeds[0] + 1, seeds.stop)
+        seeds = seeds[1:]
