@@ -32,12 +32,12 @@ LEFT_OUT = (
     "tests/unit/test_mutants.py",
     "tests/unit/dataset/test_fuzz.py",
     "tests/unit/dynamics/test_compiled_cache.py",
-    "tests/pipeline/test_bridge_tool.py",
+    "tests/pipeline/tools/test_bridge_tool.py",
     "tests/pipeline/test_crash_safety.py",
     "tests/pipeline/test_docs_python.py",
     "tests/pipeline/test_packaging.py",
     "tests/pipeline/test_readme.py",
-    "tests/pipeline/test_realism_tool.py",
+    "tests/pipeline/tools/test_realism_tool.py",
     "tests/pipeline/test_tour.py",
 )
 COMMANDS = "tests/pipeline"

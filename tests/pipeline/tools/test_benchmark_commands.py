@@ -6,8 +6,8 @@ import sys
 from typing import Any
 
 import pytest
+from benchmark_commands import IN_PARTS, QUICK, named
 
-from tests.benchmark_commands import IN_PARTS, QUICK, named
 from tests.docs_pages import ROOT
 
 # each compiles kernels of its own, or begins processes

@@ -29,14 +29,14 @@ QUICK = {
 }
 # name -> test that runs its parts: trainings and campaigns, of which the least takes minutes
 IN_PARTS = {
-    "benchmarks.bridge": "tests/pipeline/test_bridge_tool.py",
+    "benchmarks.bridge": "tests/pipeline/tools/test_bridge_tool.py",
     "benchmarks.detection": "tests/unit/diagnose/detection/test_detect_command.py",
     "benchmarks.fuzz_campaign": "tests/unit/dataset/test_fuzz.py",
     "benchmarks.general_model": "tests/unit/diagnose/recordings/test_shipped_network.py",
     "benchmarks.implants": "tests/unit/implants/test_implanting.py",
     "benchmarks.kill_campaign": "tests/pipeline/test_crash_safety.py",
     "benchmarks.machine_curve": "tests/unit/diagnose/scoring/test_machine_intervals.py",
-    "benchmarks.realism": "tests/pipeline/test_realism_tool.py",
+    "benchmarks.realism": "tests/pipeline/tools/test_realism_tool.py",
     "benchmarks.soak": "tests/pipeline/test_crash_safety.py",
 }
 

@@ -12,7 +12,7 @@ from benchmarks import _bridge_control as control
 from benchmarks import _bridge_healthy as healthy
 from benchmarks import _bridge_worlds as worlds
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "unit" / "diagnose"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "unit" / "diagnose"))
 from fake_dataset import FakeDataset
 from runs import NETWORK_ONLY, SMALL_CNN, model_of, train
 
