@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gensig.errors import DatasetError
+from gensig.terminal.printing import remark
 
 if TYPE_CHECKING:
     from diagnose.training.store import ModelDescription
@@ -97,7 +97,7 @@ def note_unsigned(folder: str | Path, description: ModelDescription) -> None:
     from diagnose.training.model_files import NOT_SIGNED
 
     if not description.is_signed:
-        print(f"diagnose: note: {folder} {NOT_SIGNED}", file=sys.stderr, flush=True)
+        remark("diagnose", f"note: {folder} {NOT_SIGNED}")
 
 
 def refuse_existing(folder: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -17,7 +16,7 @@ from diagnose.commands.parser import (
     note_unsigned,
 )
 from gensig.errors import ConfigError
-from gensig.terminal.printing import show, show_text
+from gensig.terminal.printing import remark, show, show_text
 
 if TYPE_CHECKING:
     from diagnose.recordings.source import Source
@@ -149,7 +148,7 @@ def run(arguments: Namespace) -> int:
         )
     carried = network.description.carried
     if carried is not None and not carried.fingerprints:
-        print(f"diagnose: note: {BY_CHECKSUM}", file=sys.stderr)
+        remark("diagnose", f"note: {BY_CHECKSUM}")
     domain = load_domain(folder, network.description)
     if arguments.plot:
         _plot(arguments.plot, network, sources[0])

@@ -6,6 +6,8 @@ import json
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from gensig.terminal.printing import show, show_text
+
 HELP = """\
 Is a trained network whole and unaltered?
 
@@ -43,11 +45,11 @@ def run(arguments: Namespace) -> int:
     if arguments.json:
         contents = [check.content() for check in checks]
         printed = contents[0] if len(contents) == 1 else contents
-        print(json.dumps(printed, indent=2, allow_nan=False))
+        show_text(json.dumps(printed, indent=2, allow_nan=False))
     else:
         for check in checks:
             for line in (*check.problems, *check.notes):
-                print(line)
+                show(line)
             state = (
                 f"is whole and unaltered: {check.n_files} file(s), {check.n_weights} weights, "
                 "all finite"
@@ -56,7 +58,7 @@ def run(arguments: Namespace) -> int:
                 state = f"can be used: {check.n_weights} weights, all finite"
             if check.problems:
                 state = f"is NOT whole: {len(check.problems)} problem(s)"
-            print(f"{check.folder} {state}")
+            show(f"{check.folder} {state}")
     if any(check.problems for check in checks):
         return DAMAGED
     return 0
