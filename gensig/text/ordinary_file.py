@@ -5,13 +5,13 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO
 
 NOT_ORDINARY = "it is no ordinary file"
 
 
-def open_ordinary(path: Path, *, follow_links: bool = True) -> BinaryIO:
+def open_ordinary(path: Path, *, follow_links: bool = True) -> BufferedReader:
     """An ordinary file, open for reading.
 
     A named pipe without a writer would make ``open`` wait for ever, and a device has no end. The

@@ -10,7 +10,7 @@ import io
 import math
 import os
 from pathlib import Path
-from typing import BinaryIO, TextIO
+from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +90,7 @@ def open_table(
     return io.TextIOWrapper(stream, encoding="utf-8-sig", errors=errors)
 
 
-def open_given(where: str, path: Path) -> BinaryIO:
+def open_given(where: str, path: Path) -> io.BufferedReader:
     """A file that a user named, open for reading.
 
     Raises
