@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.errors import SimulationError
+from gensig.errors import DatasetError, SimulationError
 from gensig.faults.base import Fault
 from gensig.faults.registry import read_faults
 from gensig.geometry.gear import Gear
@@ -46,6 +47,7 @@ from gensig.systems.shaft_sensors import shaft_signals
 Array = NDArray[np.float64]
 Row = Mapping[str, Any]  # one row of a plan, by column
 MISSING = float("nan")
+NUMBER = re.compile(r"[0-9]{1,18}")  # at the end of an id
 
 # The number of a row that each cause of randomness follows.
 RECORD, CONDITION, GEARBOX, SPECIMEN = "record", "condition", "gearbox", "specimen"
@@ -78,10 +80,18 @@ class RecordNumbers:
 
     @classmethod
     def of(cls, row: Row) -> RecordNumbers:
-        """Numbers at the ends of a row's ids, such as 3 of ``gearbox-0003``, 7 of ``r000007``."""
+        """Numbers at the ends of a row's ids, such as 3 of ``gearbox-0003``, 7 of ``r000007``.
+
+        DatasetError for an id without one.
+        """
         numbers = {}
         for name in (RECORD, CONDITION, GEARBOX, SPECIMEN):
             digits = str(row[f"{name}_id"]).rpartition("-")[2]
+            if not NUMBER.fullmatch(digits.lstrip("r")):
+                given = str(row[f"{name}_id"])[:40]
+                raise DatasetError(
+                    f"{name}_id {given!r} ends in no number; restore plan.csv from a copy"
+                )
             numbers[name] = int(digits.lstrip("r"))
         return cls(**numbers)
 
@@ -287,9 +297,18 @@ def row_values(row: Row) -> dict[str, float]:
 
 
 def row_faults(row: Row) -> list[Fault]:
-    """Faults of one row of a plan."""
+    """Faults of one row of a plan; DatasetError where they are no list of mappings."""
     faults: list[Fault] = []
-    for part in json.loads(str(row["faults_json"])):
+    try:
+        parts = json.loads(str(row["faults_json"]))
+    except (ValueError, RecursionError):
+        parts = None
+    if not isinstance(parts, list) or not all(isinstance(part, dict) for part in parts):
+        raise DatasetError(
+            f"faults_json {str(row['faults_json'])[:40]!r} is no list of faults; restore plan.csv "
+            "from a copy"
+        )
+    for part in parts:
         faults += read_faults(part, "faults_json")
     return faults
 
