@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks._measure import machine, write_json
 from gensig.geometry import tooth_profile
 from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import healthy_tooth
@@ -96,7 +97,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--contacts", type=int, default=64, help="over the path")
     parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--json", help="also write the figures to this file")
     wanted = parser.parse_args()
+    figures: dict[str, dict[str, float]] = {}
     systems = {
         name: read_spur_pair(read_request(words).config)
         for name, words in CONVENTIONS.items()
@@ -112,7 +115,8 @@ def main() -> None:
             lambda size=size: by_finite_elements(pair, material, position, size),
             wanted.runs,
         )
-        _print_line(f"finite elements, {name}", seconds, found, exact)
+        method = f"finite elements, {name}"
+        figures[method] = _told(method, seconds, found, exact)
     for name, each in systems.items():
         options = replace(each.mesh, elasticity="plane_stress")
         seconds, found = least_seconds(
@@ -121,12 +125,16 @@ def main() -> None:
             ),
             wanted.runs,
         )
-        _print_line(f"potential energy, {name}", seconds, found, exact)
+        method = f"potential energy, {name}"
+        figures[method] = _told(method, seconds, found, exact)
+    write_json(wanted.json, machine(), figures)
 
 
-def _print_line(name: str, seconds: float, found: Array, exact: Array) -> None:
-    error = np.abs(found / exact - 1.0).max()
+def _told(name: str, seconds: float, found: Array, exact: Array) -> dict[str, float]:
+    """CPU seconds and largest relative error of a method, printed too."""
+    error = float(np.abs(found / exact - 1.0).max())
     print(f"{name:32}{1e3 * seconds:10.2f}{100 * error:9.2f} %")
+    return {"cpu_s": seconds, "largest_error": error}
 
 
 if __name__ == "__main__":

@@ -50,6 +50,7 @@ PAGES = {
             "missing.large_impact",
             "missing.drowns_mesh_lines",
             "root_curve.more_accurate_pair",
+            "root_curve.more_efficient",
         ),
         picture="spur_14.png",
         caption="Response to a missing tooth by the paper's equations and by default",

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import warnings
 from functools import lru_cache, partial
+from pathlib import Path
 
 import numpy as np
 
@@ -28,6 +30,8 @@ from validation.checks.mesh_checks import (
 )
 from validation.root_variants import other_root_angle, straight_root_tooth
 from validation.rows import printed_value
+
+TIMES = Path(__file__).resolve().parents[3] / "reference/data/stiffness_time.csv"
 
 SIDES = ("pinion", "wheel")
 
@@ -217,6 +221,17 @@ def _straight_over_true_error(case: Case, at: str) -> float:
     return abs(result[1] - exact) / abs(result[0] - exact)
 
 
+def _times_faster(case: Case, at: str) -> float:
+    """CPU time of coarse finite elements over that of potential energy, as stored.
+
+    ``at`` is the convention of the potential energy. ``python -m benchmarks.stiffness_time``
+    measures; nothing is timed here.
+    """
+    with TIMES.open(encoding="utf-8", newline="") as file:
+        spent = {row["method"]: float(row["cpu_ms"]) for row in csv.DictReader(file)}
+    return spent["finite elements coarse"] / spent[f"potential energy {at}"]
+
+
 def _disc(index: int, case: Case, at: str) -> float:
     gear = case.gear(at)
     density = case.system.material.density_kg_per_m3
@@ -252,6 +267,7 @@ BODY: dict[str, Check] = {
     "stiffness_other_root_angle": _stiffness_other_root_angle,
     "straight_root_change": _straight_root_change,
     "straight_over_true_error": _straight_over_true_error,
+    "times_faster": _times_faster,
     "disc_mass": partial(_disc, 0),
     "disc_inertia": partial(_disc, 1),
 }
