@@ -24,6 +24,7 @@ from runs import (
 from sklearn.metrics import balanced_accuracy_score
 
 import gensig.dataset.reader
+from benchmarks._damaged_models import forge
 from diagnose.cli import main
 from diagnose.report.page import result_table, write_report
 
@@ -229,6 +230,8 @@ def test_evaluate_refuses_weights_of_another_format(
     (tmp_path / "model.json").write_bytes(description)
     (tmp_path / "model.safetensors").write_bytes(weights)
     words = ["evaluate", "data=good", "--model", str(tmp_path)]
+    refuses(capsys, words, "model.safetensors was altered")
+    forge(tmp_path)
     refuses(capsys, words, "is not a safetensors file")
 
 
