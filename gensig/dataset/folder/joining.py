@@ -14,7 +14,7 @@ from gensig.dataset.folder.layout import (
 )
 from gensig.dataset.folder.manifest import differing_keys, identity_hash
 from gensig.dataset.folder.quick_check import plan_problem
-from gensig.dataset.storage.compression import creation_options
+from gensig.dataset.storage.compression import COMPRESSIONS, creation_options
 from gensig.errors import DatasetError
 from gensig.version import __version__
 
@@ -83,6 +83,7 @@ def agreed_folder(
             f"{out} was begun with another {_listed(keys)}; leave that out, or start a new "
             "folder: only executor.* may change"
         )
+    _check_sections(out / CONFIG, config)
     creation_options(config["dataset"]["compression"])  # its package may be missing
     return manifest, config
 
@@ -93,6 +94,19 @@ def refuse_implants(out: Path, config: ConfigContent) -> None:
         raise DatasetError(
             f"{out} is made of recordings, which no simulation makes again: `gensig verify` "
             "checks it, the same `gensig implant` into another folder makes it anew"
+        )
+
+
+def _check_sections(path: Path, config: ConfigContent) -> None:
+    """Raise DatasetError for a configuration of a stranger without classes or a compression."""
+    plan, dataset = config.get("plan"), config.get("dataset")
+    classes = plan.get("classes") if isinstance(plan, dict) else None
+    if not isinstance(classes, list) or {*map(type, classes)} != {str}:
+        raise DatasetError(f"{path}: plan.classes must be a list of names")
+    compression = dataset.get("compression") if isinstance(dataset, dict) else None
+    if compression not in list(COMPRESSIONS):
+        raise DatasetError(
+            f"{path}: dataset.compression must be one of {', '.join(COMPRESSIONS)}"
         )
 
 

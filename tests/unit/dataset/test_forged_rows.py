@@ -1,7 +1,11 @@
 """Rows of a forged plan that records would be made of again."""
 
-import pytest
+from pathlib import Path
 
+import pytest
+from refusals import refused
+
+from gensig.dataset.folder.joining import _check_sections
 from gensig.errors import DatasetError
 from gensig.record.inputs import RecordNumbers, row_faults
 
@@ -33,3 +37,23 @@ def test_faults_that_are_no_list_of_mappings_are_one_line(text):
     with pytest.raises(DatasetError, match="is no list of faults"):
         row_faults({"faults_json": text})
     assert row_faults({"faults_json": "[]"}) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"plan": None}, "plan.classes must be a list of names"),
+        ({"plan": {"classes": None}}, "plan.classes must be a list of names"),
+        ({"plan": {"classes": [1]}}, "plan.classes must be a list of names"),
+        ({"dataset": []}, "dataset.compression must be one of none, gzip"),
+        (
+            {"dataset": {"compression": []}},
+            "dataset.compression must be one of none, gzip",
+        ),
+    ],
+)
+def test_a_configuration_without_classes_or_compression_is_one_line(changes, words):
+    good = {"plan": {"classes": ["crack"]}, "dataset": {"compression": "none"}}
+    _check_sections(Path("config.yaml"), good)
+    with refused(words, DatasetError):
+        _check_sections(Path("config.yaml"), good | changes)
