@@ -9,8 +9,9 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping, Sequence
+from io import BufferedReader
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -227,7 +228,7 @@ def altered_text(path: Path) -> str:
     return f"{path} was altered: its sha256 is not the one in {DESCRIPTION}; restore it from a copy"
 
 
-def _check_size(path: Path, file: BinaryIO, recorded: int) -> None:
+def _check_size(path: Path, file: BufferedReader, recorded: int) -> None:
     size = file.seek(0, 2)
     file.seek(0)
     if size != recorded:
@@ -237,7 +238,7 @@ def _check_size(path: Path, file: BinaryIO, recorded: int) -> None:
         )
 
 
-def _kinds(path: Path, file: BinaryIO) -> dict[str, Kind]:
+def _kinds(path: Path, file: BufferedReader) -> dict[str, Kind]:
     """Type and shape of every tensor, from the header, whose promise the file must keep."""
     size = file.seek(0, 2)
     file.seek(0)
@@ -319,7 +320,7 @@ def _kind_text(kind: Kind) -> str:
     return f"{dtype} ({', '.join(map(str, shape))[:80]})"
 
 
-def _opened(path: Path, limit: int) -> BinaryIO:
+def _opened(path: Path, limit: int) -> BufferedReader:
     """An ordinary file of a model folder, of at most so many bytes."""
     try:
         file = open_part(path, part_of=MODEL)

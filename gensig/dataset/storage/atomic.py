@@ -7,8 +7,8 @@ import os
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO
 
 from gensig.errors import DatasetError, WriteError
 from gensig.text.ordinary_file import is_refused, open_ordinary
@@ -205,7 +205,7 @@ def _ordinary_bytes(path: Path, *, limit: int, follow_links: bool) -> bytes:
 
 def open_part(
     path: Path, *, follow_links: bool = False, part_of: str = DATA_SET
-) -> BinaryIO:
+) -> BufferedReader:
     """An ordinary file of a stranger's folder, open for reading; never waits.
 
     Parameters
@@ -231,7 +231,7 @@ def open_part(
 
 
 def refuse_larger(
-    path: Path, file: BinaryIO, limit: int, part_of: str = DATA_SET
+    path: Path, file: BufferedReader, limit: int, part_of: str = DATA_SET
 ) -> None:
     """Raise DatasetError for an open file of more bytes than a limit."""
     size = os.fstat(file.fileno()).st_size
