@@ -123,6 +123,11 @@ def test_the_area_is_the_share_of_pairs_in_order(values, area) -> None:
     assert separation(of, np.array([values], dtype=float)) == area
 
 
+def test_yes_and_no_are_values_too() -> None:
+    answers = np.array([[False, False, True, True, True, False]])
+    assert separation(judged(1, 2), answers) == pytest.approx(7 / 8)
+
+
 def test_what_was_not_judged_is_left_out_of_the_area() -> None:
     of = judged(1, 2)
     values = np.array([[0.0, np.nan, 1.0, 1.0, -1.0, np.nan]])
