@@ -53,6 +53,7 @@ SECONDS_A_TEST = 240  # a longer test hangs; the first may compile the kernels
 SECONDS_A_MUTANT = 900  # for all its tests
 KILLER = re.compile(r"^(?:FAILED|ERROR) (tests/\S+?\.py(?:::\w+)*)", re.MULTILINE)
 NAMED = re.compile(rf"\b(?:{'|'.join(PACKAGES)})(?:\.\w+)+")  # a module in a text
+ANY = "*"  # after a folder: any of its modules
 PASSED, NO_TESTS, WRONG_USE = 0, 5, 4  # exit statuses of pytest
 
 
@@ -222,6 +223,8 @@ def nearest_tests(root: Path, name: str, function: str = "") -> list[str]:
         for test, imported in _imports_of_tests(root).items()
         if not test.startswith(LEFT_OUT)
     }
+    if "commands" in Path(name).parts:
+        function = Path(name).stem  # a test of a command has the verb, not its function
     farthest = max(FARTHEST, min(distances.values(), default=FARTHEST))
     for test, distance in distances.items():
         likeness = _likeness(test, name)
@@ -286,11 +289,18 @@ def _imports_of_tests(root: Path) -> dict[str, frozenset[str]]:
 @cache
 def _imports_of_modules(root: Path) -> dict[str, frozenset[str]]:
     """Module of the project -> modules that it imports."""
-    return {
-        _dotted(path.relative_to(root).as_posix()): frozenset(_imports(path))
+    paths = {
+        _dotted(path.relative_to(root).as_posix()): path
         for package in PACKAGES
         for path in (root / package).rglob("*.py")
     }
+    imports = {}
+    for module, path in paths.items():
+        names = _imports(path)
+        folders = tuple(name.removesuffix(ANY) for name in names if name.endswith(ANY))
+        ends = frozenset(other for other in paths if other.startswith(folders))
+        imports[module] = names | ends
+    return imports
 
 
 def _distance(root: Path, imported: frozenset[str], module: str) -> int:
@@ -320,6 +330,8 @@ def _imports(path: Path) -> frozenset[str]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             names |= set(NAMED.findall(node.value))
+            if node.value.endswith(".") and NAMED.fullmatch(node.value[:-1]):
+                names.add(node.value + ANY)  # begin of a name that is completed later
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         if isinstance(node, ast.ImportFrom) and node.module:

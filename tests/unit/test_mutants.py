@@ -326,10 +326,11 @@ class TestVerdicts:
     [
         ("gensig/signals/reading/reader_child.py", "signals/test_hostile_recordings"),
         ("gensig/commands/figures/wear_figure.py", "commands/test_"),
+        ("diagnose/commands/predict.py", "recordings/test_healthy_recordings"),
     ],
 )
 def test_modules_that_no_import_statement_reaches_have_tests(module, test):
-    assert any(test in name for name in nearest_tests(ROOT, module, "main"))
+    assert any(test in name for name in nearest_tests(ROOT, module, "run"))
 
 
 def result_with(verdict: str, text: str = "") -> Result:
