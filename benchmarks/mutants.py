@@ -170,19 +170,19 @@ def with_equivalents(results: Sequence[Result]) -> list[Result]:
     return classified
 
 
-def table(results: Sequence[Result]) -> str:
-    """Killed share by package, as text."""
-    by_package: dict[str, Counter[str]] = defaultdict(Counter)
+def table(results: Sequence[Result], of: str = "package") -> str:
+    """Killed share by ``package`` or ``operator`` of the mutants, as text."""
+    groups: dict[str, Counter[str]] = defaultdict(Counter)
     for result in results:
-        by_package[result.mutant.package][result.verdict] += 1
-        by_package["all"][result.verdict] += 1
-    lines = [f"{'package':<22}{'killed':>8}{'of':>6}{'share':>8}{'equivalent':>12}"]
-    for package in (*sorted(by_package.keys() - {"all"}), "all"):
-        counts = by_package[package]
+        groups[getattr(result.mutant, of)][result.verdict] += 1
+        groups["all"][result.verdict] += 1
+    lines = [f"{of:<22}{'killed':>8}{'of':>6}{'share':>8}{'equivalent':>12}"]
+    for name in (*sorted(groups.keys() - {"all"}), "all"):
+        counts = groups[name]
         judged = sum(counts.values()) - counts[EQUIVALENT]
         share = counts[KILLED] / max(judged, 1)
         lines.append(
-            f"{package:<22}{counts[KILLED]:>8}{judged:>6}{share:>8.1%}{counts[EQUIVALENT]:>12}"
+            f"{name:<22}{counts[KILLED]:>8}{judged:>6}{share:>8.1%}{counts[EQUIVALENT]:>12}"
         )
     return "\n".join(lines)
 
@@ -238,7 +238,7 @@ def report(results: Sequence[Result]) -> bool:
         unexplained |= mutant.key not in reasons
         print(f"{result.verdict}: {mutant.file}:{mutant.line} in {mutant.function}")
         print(f"    {mutant.original}  ->  {mutant.mutated}\n    {reason}")
-    print(table(results))
+    print(table(results), table(results, "operator"), sep="\n\n")
     counts = Counter(result.verdict for result in results)
     judged = len(results) - counts[EQUIVALENT]
     return counts[KILLED] >= GOAL * judged and not unexplained

@@ -367,6 +367,19 @@ class TestReport:
         results += [result_with(EQUIVALENT)] * 100
         assert mutants.report(results) is reached
 
+    @pytest.mark.parametrize(
+        ("of", "group"), [("package", "gensig/a"), ("operator", "sign")]
+    )
+    def test_the_table_has_the_killed_share_of_each_group(self, of, group):
+        results = [
+            result_with(KILLED),
+            result_with("survived"),
+            result_with(EQUIVALENT),
+        ]
+        rows = [line.split() for line in mutants.table(results, of).splitlines()]
+        assert rows[0][0] == of
+        assert rows[1:] == [[name, "1", "2", "50.0%", "1"] for name in (group, "all")]
+
     def test_a_survivor_without_a_reason_is_a_failure(self, monkeypatch):
         monkeypatch.setattr(mutants, "read_reasons", lambda _: {})
         results = [result_with(KILLED)] * 99 + [result_with("survived")]
