@@ -16,6 +16,8 @@ SLOW = {
     "benchmarks.contact_law",
     "benchmarks.scaling",
     "benchmarks.many_records",
+    "benchmarks.shaft_line",
+    "benchmarks.stages",
 }
 
 
