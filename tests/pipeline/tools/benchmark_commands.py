@@ -18,6 +18,7 @@ QUICK = {
     "benchmarks.mutants": ("--stored",),
     "benchmarks.replay_rate": ("--quick",),
     "benchmarks.ross": ("--stored",),
+    "benchmarks.same_signals": ("--quick",),
     "benchmarks.scaling": ("--quick",),
     "benchmarks.shaft_line": (
         *("--duration", "0.01", "--checked", "0.01", "--oversampling", "2"),
