@@ -4,7 +4,7 @@ import re
 import shlex
 from collections.abc import Iterator
 
-from tests.docs_pages import PAGES, ROOT
+from docs_pages import PAGES, ROOT
 
 COMMAND = re.compile(r"python\s+-m\s+(benchmarks(?:\.\w+)?)([^`\n#;,|]*)")
 # name -> words of the smallest run that passes through the whole command
@@ -19,24 +19,28 @@ QUICK = {
     "benchmarks.replay_rate": ("--quick",),
     "benchmarks.ross": ("--stored",),
     "benchmarks.same_signals": ("--quick",),
+    "benchmarks.same_signals": ("--quick",),
     "benchmarks.scaling": ("--quick",),
     "benchmarks.shaft_line": (
         *("--duration", "0.01", "--checked", "0.01", "--oversampling", "2"),
     ),
     "benchmarks.stages": ("--quick",),
     "benchmarks.stiffness_time": ("--contacts", "2", "--runs", "1"),
-    "benchmarks.storage": ("--records", "2", "--runs", "1"),
+    "benchmarks.storage": ("--records", "4", "--runs", "1"),
     "benchmarks.vector_widths": ("--quick",),
 }
 # name -> test that runs its parts: trainings and campaigns, of which the least takes minutes
 IN_PARTS = {
     "benchmarks.bridge": "tests/pipeline/tools/test_bridge_tool.py",
+    "benchmarks.carried_parts": "tests/unit/implants/test_fingerprints.py",
     "benchmarks.detection": "tests/unit/diagnose/detection/test_detect_command.py",
     "benchmarks.fuzz_campaign": "tests/unit/dataset/test_fuzz.py",
     "benchmarks.general_model": "tests/unit/diagnose/recordings/test_shipped_network.py",
+    "benchmarks.hostile_options": "tests/unit/options/test_wrong_shapes.py",
     "benchmarks.implants": "tests/unit/implants/test_implanting.py",
     "benchmarks.kill_campaign": "tests/pipeline/test_crash_safety.py",
     "benchmarks.machine_curve": "tests/unit/diagnose/scoring/test_machine_intervals.py",
+    "benchmarks.model_campaign": "tests/unit/diagnose/recordings/test_strangers_models.py",
     "benchmarks.realism": "tests/pipeline/tools/test_realism_tool.py",
     "benchmarks.soak": "tests/pipeline/test_crash_safety.py",
 }
