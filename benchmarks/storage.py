@@ -157,6 +157,7 @@ def main() -> None:
         f"plan.n_records={arguments.records}",
         "sensing.snr_db=null",
         "plan.vary={}",
+        "plan.n_reference=0",  # all records in one shard
     ]
     config = read_request(
         [*words, f"dataset.records_per_shard={arguments.records}"]
