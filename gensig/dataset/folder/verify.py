@@ -219,6 +219,9 @@ def _tables(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | None]:
             )
     except DatasetError as error:
         problems.append(str(error))
+    n_planned = plan_digest(folder)[1]
+    if n_planned > manifest.n_records:  # not read: it may be of any size
+        return [*problems, records_problem(n_planned, manifest)], None
     try:
         plan = read_plan(folder / PLAN)
     except DatasetError as error:
