@@ -19,7 +19,6 @@ QUICK = {
     "benchmarks.replay_rate": ("--quick",),
     "benchmarks.ross": ("--stored",),
     "benchmarks.same_signals": ("--quick",),
-    "benchmarks.same_signals": ("--quick",),
     "benchmarks.scaling": ("--quick",),
     "benchmarks.shaft_line": (
         *("--duration", "0.01", "--checked", "0.01", "--oversampling", "2"),

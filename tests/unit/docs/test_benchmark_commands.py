@@ -7,12 +7,7 @@ from typing import Any
 
 import pytest
 from benchmark_commands import IN_PARTS, QUICK, named
-<<<<<<<< HEAD:tests/pipeline/tools/test_benchmark_commands.py
-
-from tests.docs_pages import ROOT
-========
 from docs_pages import ROOT
->>>>>>>> c180980e (Tests of benchmark commands live with those of the pages):tests/unit/docs/test_benchmark_commands.py
 
 # each compiles kernels of its own, or begins processes
 SLOW = {
