@@ -44,8 +44,9 @@ REFUSALS = [
     ("classes={a: 1}", r"classes must be a list, for instance classes=\[a,b\]"),
     *(
         (f"sampling_rate_hz={value}", "sampling_rate_hz must be null or a number")
-        for value in ("fast", "0", "-5", "true", "inf")
+        for value in ("fast", "0", "-5", "true")
     ),
+    ("sampling_rate_hz=inf", "sampling_rate_hz = inf must be a finite number"),
     ("remaining_life.early_life_h=0", "early_life_h must be a number above 0, not 0"),
     ("remaining_life.early_life_share=0", "early_life_share must be a number above 0"),
     ("remaining_life.coverage=1", "coverage must be a number above 0 and below 1"),

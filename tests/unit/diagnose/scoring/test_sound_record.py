@@ -156,8 +156,10 @@ def test_one_condition_a_machine_gives_the_next_repeat():
 @pytest.mark.parametrize(("fall", "low", "high"), [(0.4, 0.9, 1.0), (1.0, 0.0, 0.85)])
 def test_unseen_machines_are_told_apart_if_a_tooth_changed(fall, low, high):
     task, settings = opened(Machines(fall=fall, n_units=12, records_per_unit=6))
-    (prediction,) = run(task, settings, Job(protocols=("by_unit",), seed=None))
+    job = Job(protocols=("by_unit",), seed=None)
+    prediction, *shuffled = run(task, settings, job)
     assert prediction.method == "sound_record"
+    assert {each.method for each in shuffled} == {"label_shuffle_sound_record"}
     share_right = np.mean(prediction.predicted == task.labels()[prediction.record])
     assert low <= share_right <= high
 
