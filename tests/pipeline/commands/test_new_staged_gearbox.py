@@ -242,6 +242,9 @@ def test_shipped_and_taken_names_are_refused(gensig, tmp_path, capsys):
     assert "system=two_stage_gearbox comes with gensig" in capsys.readouterr().err
     gensig(NEW)
     (tmp_path / "experiment" / "mine.yaml").unlink()
+    assert main(NEW.split()) == 0  # as after a killed call: the same texts are finished
+    (tmp_path / "experiment" / "mine.yaml").unlink()
+    (tmp_path / "system" / "mine.yaml").write_text("# of somebody else\n")
     assert main(NEW.split()) == 2
     assert "mine.yaml is there already" in capsys.readouterr().err
 
