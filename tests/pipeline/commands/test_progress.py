@@ -1,5 +1,6 @@
 """Reports of a run: a bar on a terminal, lines elsewhere, nothing when quiet, always a log."""
 
+import errno
 import os
 import pickle
 import pty
@@ -9,11 +10,13 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import pytest
 from small_sets import TINY, contents, make
 
 from gensig.cli import main
+from gensig.dataset.folder import run_log
 from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.storage.checksums import read_checksums
@@ -202,13 +205,18 @@ def test_the_log_tells_of_a_run_that_ended_early(tmp_path, monkeypatch, capsys):
     assert verify(out).complete
 
 
-def test_a_log_that_cannot_be_written_stops_nothing(tmp_path):
+def test_a_log_that_cannot_be_written_stops_nothing(tmp_path, monkeypatch):
+    def refuse(*_words):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
     out = tmp_path / "data"
     assert main(["plan", "--freeze", *TINY, f"out={out}"]) == 0
     (out / "run.log").unlink()
-    (out / "run.log").mkdir()
+    refusing = SimpleNamespace(**{**vars(os), "open": refuse})
+    monkeypatch.setattr(run_log, "os", refusing)
     assert main(["resume", "--quiet", "--workers", "1", str(out)]) == 0
     assert verify(out).complete
+    assert not (out / "run.log").exists()
 
 
 def test_an_edited_card_is_named_and_accepted_when_asked(data, capsys):
