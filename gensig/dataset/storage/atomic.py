@@ -199,8 +199,8 @@ def read_text(path: Path, *, limit: int, follow_links: bool = False) -> str:
 def _ordinary_bytes(path: Path, *, limit: int, follow_links: bool) -> bytes:
     """Bytes of an ordinary file of at most so many."""
     with open_part(path, follow_links=follow_links) as file:
-        refuse_larger(path, file, limit)
-        return file.read(limit)
+        n_bytes = refuse_larger(path, file, limit)
+        return file.read(n_bytes)
 
 
 def open_part(
@@ -232,14 +232,15 @@ def open_part(
 
 def refuse_larger(
     path: Path, file: BufferedReader, limit: int, part_of: str = DATA_SET
-) -> None:
-    """Raise DatasetError for an open file of more bytes than a limit."""
+) -> int:
+    """Bytes of an open file; DatasetError for more than a limit."""
     size = os.fstat(file.fileno()).st_size
     if size > limit:
         raise DatasetError(
             f"{path} has {size} bytes, at most {limit} are allowed; it is no file of a "
             f"gensig {part_of}"
         )
+    return size
 
 
 def _no_file(path: Path, part_of: str) -> DatasetError:

@@ -6,7 +6,8 @@ import socket
 import pytest
 
 from gensig.cli import main
-from gensig.errors import ConfigError
+from gensig.dataset.storage.atomic import read_text
+from gensig.errors import ConfigError, DatasetError
 from gensig.text.ordinary_file import is_refused, open_ordinary
 from gensig.text.user_file import open_table
 
@@ -82,3 +83,12 @@ def test_every_verb_names_a_pipe_in_one_line(verb, tmp_path, monkeypatch, capsys
     (line,) = capsys.readouterr().err.splitlines()
     assert "given" in line
     assert reason in line
+
+
+def test_a_limit_takes_no_memory(tmp_path):
+    """A limit far beyond the memory: what is read is the file."""
+    path = tmp_path / "plan.csv"
+    path.write_text("record_id\n")
+    assert read_text(path, limit=2**45) == "record_id\n"
+    with pytest.raises(DatasetError, match="has 10 bytes, at most 9"):
+        read_text(path, limit=9)
