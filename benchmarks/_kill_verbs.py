@@ -295,7 +295,7 @@ def _not_told(
     after: dict[str, bytes],
     wanted: dict[str, bytes],
 ) -> list[str]:
-    """What is wrong with the end of a command on a full disk, which may refuse its log alone."""
+    """Faults of the end of a command on a full disk, which may refuse its log alone."""
     if ended.status == 0:
         return [] if after == wanted else ["ends with 0 and is not whole"]
     if ended.status not in (1, 2) or "free some space" not in ended.said:

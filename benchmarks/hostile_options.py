@@ -165,7 +165,7 @@ def _paths(content: dict[str, Any]) -> Iterator[tuple[str, ...]]:
 
 
 def answer(case: Case, folder: Path) -> tuple[str, str]:
-    """How a case ends: ``one line``, ``accepted`` or ``otherwise``, and its text."""
+    """End of a case: ``one line``, ``accepted`` or ``otherwise``, and its text."""
     target = folder / case.group / "stranger.yaml"
     target.parent.mkdir(parents=True, exist_ok=True)
     target.write_text(case.text, encoding="utf-8")

@@ -41,7 +41,7 @@ NO_AVX512 = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
-    """Where the records are made.
+    """Environment that makes the records.
 
     Attributes
     ----------

@@ -12,7 +12,7 @@ from gensig.systems.run import CleanRecord
 
 
 def inputs(faults, gain):
-    """What the law reads of the inputs of a record."""
+    """Inputs of a record, as far as the law reads them."""
     sensing = SimpleNamespace(fault_gain=gain)
     machine = SimpleNamespace(sensing=sensing)
     return SimpleNamespace(run=SimpleNamespace(faults=faults), machine=machine)
