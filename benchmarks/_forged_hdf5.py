@@ -182,7 +182,7 @@ def index_source(file: h5py.File, folder: Path, rng: Rng) -> None:
         "manifest.json",
         "shards/shard-00009.h5",
         ".",
-        "shards/shard-%b.h5",
+        "shards/shard-%%b.h5",
         "shards/shard-00001.h5",
     )
     n, source = file["label"].shape[0], chosen(names, rng)

@@ -69,7 +69,7 @@ def test_what_a_library_prints_is_no_answer():
 
 
 def test_a_message_is_one_printable_line():
-    with refused("a b  [31mxxx") as caught:
+    with refused(r"a\nb \x1b[31mxxx") as caught:
         by("names")
     assert len(str(caught.value)) == 1000
     assert str(caught.value).isprintable()
