@@ -4,10 +4,12 @@ import io
 import json
 import sys
 import warnings
+from functools import partial
 
 import pytest
+from rich.console import Console
 
-from diagnose.progress import progress
+from diagnose.progress import _bar, progress
 from gensig.commands.console import remark, step
 from gensig.dataset.folder.layout import LOG
 from gensig.dataset.folder.run_log import log
@@ -80,6 +82,15 @@ def test_what_goes_to_stderr_is_one_line(act, capsys):
     assert printed.count("\n") == 1
     assert printed.removesuffix("\n").isprintable()
     assert SHOWN in printed or ON_ONE_LINE in printed
+
+
+def test_the_bar_shows_brackets_of_a_name_as_they_are(monkeypatch):
+    terminal = io.StringIO()
+    console = partial(Console, file=terminal, force_terminal=True, width=200)
+    monkeypatch.setattr("rich.console.Console", lambda stderr: console())
+    with _bar(1, "training") as advance:
+        advance("set [bold]a[/bold]")
+    assert "set [bold]a[/bold]" in terminal.getvalue()
 
 
 def test_the_log_of_a_run_is_escaped(tmp_path):

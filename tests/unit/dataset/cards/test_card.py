@@ -87,6 +87,12 @@ def test_the_validator_would_find_a_mistake(folder):
         mlcroissant.Dataset(jsonld=folder / "croissant.json")
 
 
+def test_croissant_is_read_line_by_line(folder):
+    """A change of one value is one changed line, as in a review of a card."""
+    lines = (folder / "croissant.json").read_text(encoding="utf-8").splitlines()
+    assert any(line.startswith(' "name": ') for line in lines)
+
+
 def test_croissant_lists_every_file_with_its_digest(folder):
     content = json.loads((folder / "croissant.json").read_text(encoding="utf-8"))
     listed = {item["contentUrl"]: item["sha256"] for item in content["distribution"]}
