@@ -10,7 +10,7 @@ from diagnose.cli import main
 from diagnose.data.protocols import channels_to_cross
 from diagnose.data.windows import load_windows, subset_segments
 from diagnose.studies.study import plan_study, task_from
-from diagnose.training.store import load_model
+from diagnose.training.store import data_fingerprint, load_model
 from gensig.errors import ConfigError
 
 FOUR = ("a", "b", "c", "d")
@@ -139,3 +139,14 @@ def test_evaluate_refuses_channels_that_do_not_fit(
 ):
     serve(monkeypatch, {"four": four()})
     refuses(capsys, ["evaluate", "data=four", f"--model={model}", word], message)
+
+
+@pytest.mark.parametrize("name", ["record_id", "unit_id", "label", "speed_rpm"])
+def test_a_set_with_another_value_is_another_set(name):
+    """Else a model would be judged on other records as those it was trained on."""
+    dataset, other = FakeDataset(), FakeDataset()
+    assert data_fingerprint(dataset) == data_fingerprint(other)
+    values = other.columns[name].copy()
+    values[0] = values[-1]
+    other.columns[name] = values
+    assert data_fingerprint(dataset) != data_fingerprint(other)
