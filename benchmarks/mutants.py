@@ -139,6 +139,19 @@ def read_results(path: Path) -> list[Result]:
     return results
 
 
+def other_draw(path: Path, seed: int) -> str:
+    """A line for a file whose results are of another seed, '' where a draw may go on."""
+    if not path.exists():
+        return ""
+    stored = json.loads(path.read_text(encoding="utf-8"))["seed"]
+    if stored == seed:
+        return ""
+    return (
+        f"{path} has the draw of seed {stored}, not {seed}; give --seed {stored}, or another "
+        "--json FILE, that becomes the stored one when it is whole"
+    )
+
+
 def write_results(path: Path, results: Sequence[Result], seed: int) -> None:
     """A JSON file with one mutant a line."""
     rows = []
@@ -261,6 +274,8 @@ def main() -> int:
     stored = with_equivalents(read_results(arguments.json))
     results = {result.mutant.key: result for result in stored}
     failing: list[str] = []
+    if not arguments.stored and (line := other_draw(arguments.json, arguments.seed)):
+        parser.error(line)
     if not arguments.stored:
         with tempfile.TemporaryDirectory(prefix="gensig-mutants-") as name:
             copy = Copy(

@@ -442,3 +442,11 @@ def test_equivalent_mutants_survive(real_copy):
     assert chosen
     verdicts = {mutants.judge(real_copy, mutant, "").verdict for mutant in chosen}
     assert verdicts == {"survived"}
+
+
+def test_two_draws_are_not_mixed(tmp_path):
+    path = tmp_path / "results.json"
+    assert mutants.other_draw(path, 48) == ""
+    mutants.write_results(path, [], 48)
+    assert mutants.other_draw(path, 48) == ""
+    assert "has the draw of seed 48, not 47" in mutants.other_draw(path, 47)

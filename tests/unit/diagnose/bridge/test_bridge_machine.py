@@ -1,7 +1,9 @@
 """A machine of a measured set for the bridge: what is used, what is left out, what is refused."""
 
+import hashlib
+import json
 import shlex
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -151,3 +153,10 @@ def test_the_wrong_gearbox_keeps_the_first_mesh_and_no_shaft(teeth) -> None:
             scale * train(wrong).shaft_ratio(shaft) / train(teeth).shaft_ratio(shaft)
         )
         assert 1.2 < ratio < 1.6
+
+
+def test_the_frozen_numbers_are_those_of_their_version():
+    """A number of the protocol that changes needs a new version, and new digits here."""
+    numbers = json.dumps(asdict(FROZEN), sort_keys=True).encode()
+    frozen = FROZEN.version, hashlib.sha256(numbers).hexdigest()[:16]
+    assert frozen == (2, "ee7aa2f9380b5439")
