@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar
@@ -19,6 +19,7 @@ from diagnose.data.windows import (
     Task,
     WindowSet,
     subset_segments,
+    subsets_of,
 )
 
 
@@ -73,6 +74,11 @@ class Source:
     windows: Callable[[], Mapping[str, WindowSet]]
     caches: dict[str, Cache]
 
+    @property
+    def subsets(self) -> tuple[str, ...]:
+        """Subsets of the protocol, and the references of its validation machines if any."""
+        return subsets_of(self.task, self.protocol)
+
     def part(self, subset: str) -> Task:
         """The task with the channels of a subset."""
         return self.task.part(self.protocol, subset)
@@ -84,27 +90,38 @@ class Source:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """Tables of the three subsets, with the same columns."""
+    """Tables of the three subsets, with the same columns.
+
+    ``references`` are those of the validation machines, None without any or where a baseline cannot
+    judge them.
+    """
 
     train: FeatureTable
     validation: FeatureTable
     test: FeatureTable
+    references: FeatureTable | None = None
 
     @classmethod
-    def of(cls, table: Callable[[str], FeatureTable]) -> Parts:
+    def of(
+        cls, table: Callable[[str], FeatureTable], subsets: Iterable[str] = SUBSETS
+    ) -> Parts:
         """Tables that a function makes for each subset."""
-        return cls(**{subset: table(subset) for subset in SUBSETS})
+        return cls(**{subset: table(subset) for subset in subsets})
 
     def judged(self) -> FeatureTable:
-        """Validation and test rows; test rows alone if a record is in both, as in a leaky split."""
+        """Validation, reference and test rows.
+
+        Test rows alone if a record is in validation too, as in a leaky split.
+        """
         if np.isin(self.validation.record, self.test.record).any():
             return self.test
-        both = (self.validation, self.test)
+        parts = (self.validation, self.references, self.test)
+        judged = [table for table in parts if table is not None]
         return FeatureTable(
-            values=np.concatenate([table.values for table in both]),
+            values=np.concatenate([table.values for table in judged]),
             names=self.test.names,
-            label=np.concatenate([table.label for table in both]),
-            record=np.concatenate([table.record for table in both]),
+            label=np.concatenate([table.label for table in judged]),
+            record=np.concatenate([table.record for table in judged]),
         )
 
 

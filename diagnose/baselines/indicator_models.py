@@ -18,7 +18,7 @@ def indicator_tables(source: Source) -> Parts:
         task = source.part(subset)
         return feature_table(task, segments, features=features, cache=cache)
 
-    return Parts.of(table)
+    return Parts.of(table, source.subsets)
 
 
 INDICATOR_INPUT = Input(name="indicators", make=indicator_tables)

@@ -174,7 +174,10 @@ def rocket_tables(sets: Mapping[str, WindowSet], *, n_features: int) -> Parts:
     def features(block: NDArray[np.float32]) -> FloatArray:
         return minirocket_features(block, banks)
 
-    return Parts.of(lambda subset: over_stretches(sets[subset], features, "rocket"))
+    def table(subset: str) -> FeatureTable:
+        return over_stretches(sets[subset], features, "rocket")
+
+    return Parts.of(table, sets)
 
 
 def _make(source: Source) -> Parts:

@@ -46,7 +46,7 @@ def spectrum_tables(source: Source) -> Parts:
     """Spectra of the windows of every subset, with the same divisor."""
     sets = source.windows()
     scale = input_scale(sets["train"])
-    return Parts.of(lambda subset: spectrum_table(sets[subset], scale))
+    return Parts.of(lambda subset: spectrum_table(sets[subset], scale), sets)
 
 
 SPECTRUM_INPUT = Input(name="spectra", make=spectrum_tables)

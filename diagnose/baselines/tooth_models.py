@@ -33,12 +33,12 @@ from diagnose.baselines.features import (
 from diagnose.baselines.tooth_features import GEAR_FEATURES, tooth_features
 from diagnose.data.teeth import missing_teeth
 from diagnose.data.windows import (
-    SUBSETS,
     FloatArray,
     Segments,
     Task,
     read_signal,
     subset_segments,
+    subsets_of,
 )
 from gensig.signals.separation import separate_gears
 
@@ -59,7 +59,7 @@ def why_no_turns(task: Task, protocol: str) -> str | None:
         return f"the data set does not say {missing}"
     speed = np.asarray(dataset.column("speed_rpm"), dtype=float)
     turns = []
-    for subset in SUBSETS:
+    for subset in subsets_of(task, protocol):
         segments = subset_segments(task, protocol, subset)
         seconds = (segments.stop - segments.start) / dataset.sampling_rate
         turns.append(np.min(seconds * speed[segments.record] / 60))
@@ -122,7 +122,7 @@ def tooth_tables(source: Source) -> Parts:
     def table(subset: str) -> FeatureTable:
         return tooth_table(source.part(subset), source.segments(subset), cache)
 
-    return Parts.of(table)
+    return Parts.of(table, source.subsets)
 
 
 TEETH_INPUT = Input(name="teeth", make=tooth_tables, why_not=why_no_turns)

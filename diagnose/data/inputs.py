@@ -71,6 +71,11 @@ class NetworkInput(ABC):
     has_window_length: ClassVar[bool]
     why_not_exported: ClassVar[str | None]
 
+    @property
+    def compares(self) -> bool:
+        """True if the input compares a record with healthy ones of its machine."""
+        return False
+
     @classmethod
     @abstractmethod
     def completed(

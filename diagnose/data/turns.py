@@ -145,9 +145,14 @@ class Turns(NetworkInput):
         )
 
     @property
+    def compares(self) -> bool:
+        """True if references are looked at."""
+        return self.reference != NO_REFERENCE
+
+    @property
     def n_kinds(self) -> int:
         """Number of turns of either gear in an input."""
-        return 1 + self.unexplained + (self.reference != NO_REFERENCE)
+        return 1 + self.unexplained + self.compares
 
     def check(self, task: Task, segments: Segments, network: str) -> None:
         """Refuse stretches that hold no turn of the driving gear, with the shortest one."""
@@ -241,10 +246,8 @@ class Turns(NetworkInput):
                 "this model looks at turns and must know the teeth of both gears: "
                 f"say --teeth of {file}, of the driving gear first"
             )
-        if (self.reference != NO_REFERENCE) != bool(recording.healthy):
-            raise ConfigError(
-                HEALTHY_NEEDED if self.reference != NO_REFERENCE else NO_HEALTHY
-            )
+        if self.compares != bool(recording.healthy):
+            raise ConfigError(HEALTHY_NEEDED if self.compares else NO_HEALTHY)
         rate, mesh = recording.sampling_rate, speed_rpm / 60 * n_teeth[0]
         if 0.5 * rate < LEAST_HARMONICS * mesh:
             raise ConfigError(
@@ -376,7 +379,7 @@ class Turns(NetworkInput):
         if not self.each_channel:
             return [(turns, sound)]
         return [
-            (_channel(turns, index), [_channel(other, index) for other in sound])
+            (turns.of_channel(index), [other.of_channel(index) for other in sound])
             for index in range(len(turns.mesh))
         ]
 
@@ -387,7 +390,7 @@ class Turns(NetworkInput):
         ------
         ConfigError    for a record without a reference
         """
-        if self.reference == NO_REFERENCE:
+        if not self.compares:
             return lambda record: []
         chosen = all_references(task, reference_kind(self.reference))
         n_samples, rate = int(task.dataset.n_samples), task.dataset.sampling_rate
@@ -414,7 +417,7 @@ class Turns(NetworkInput):
     def _add_redraws(self, task: Task, segments: Segments, gathered: _Gathered) -> None:
         """Take in the records of the segments as those of machines drawn anew."""
         sound: Sequence[Sequence[int]] = ()
-        if self.reference != NO_REFERENCE:
+        if self.compares:
             sound = all_references(task, reference_kind(self.reference))
         redrawn = RedrawnTurns(task, self.samples_per_tooth, self.redraws)
         for record in segments.record.tolist():
@@ -472,16 +475,6 @@ def _checked_whitening(value: Any) -> bool | str:
             f"model.{WHITENED} must be true, false or {MACHINE}, not {value!r}"
         )
     return value if value == MACHINE else bool(value)
-
-
-def _channel(turns: GearTurns, index: int) -> GearTurns:
-    """Turns of one channel, which keeps its axis."""
-    chosen = slice(index, index + 1)
-    return GearTurns(
-        driving=turns.driving[chosen],
-        driven=turns.driven[chosen],
-        mesh=turns.mesh[chosen],
-    )
 
 
 def _speed_rpm(task: Task) -> FloatArray:

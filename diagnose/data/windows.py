@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 IntArray = NDArray[np.integer]
 FloatArray = NDArray[np.floating]
 SUBSETS = ("train", "validation", "test")
+REFERENCES = "references"  # reference records of the machines of the validation part
 NORMALISATIONS = ("rms", "none")
 HEALTHY = "healthy"  # name of the class without a fault
 CROSS_SENSOR = "cross_sensor"  # the units of by_unit, tested on other channels
@@ -40,6 +41,7 @@ class Task:
     window_samples, stride_samples : length of a window and step from one to the next, in samples
     normalise : ``"rms"`` divides each channel of each window by its RMS, ``"none"`` keeps m/s^2
     one_class : True if one class is enough, because classes are not what is learnt
+    of_references : True for the reference records in place of the examples
     cross_channels : channels that `CROSS_SENSOR` trains and tests on,
         or the reason why there are none, in one line
     """
@@ -51,6 +53,7 @@ class Task:
     stride_samples: int
     normalise: str
     one_class: bool = False
+    of_references: bool = False
     cross_channels: tuple[tuple[str, ...], tuple[str, ...]] | str = (
         "no channels to test on are named"
     )
@@ -73,23 +76,27 @@ class Task:
         return [available.index(name) for name in self.channel_names]
 
     def part(self, protocol: str, subset: str) -> Task:
-        """The task of one subset of a protocol; `CROSS_SENSOR` has other channels in each.
+        """The task of one subset of a protocol, or of `REFERENCES`.
+
+        `CROSS_SENSOR` has other channels in its test part.
 
         Raises
         ------
         ConfigError    for `CROSS_SENSOR` of a task that has no channels to test on
         """
+        part = replace(self, of_references=subset == REFERENCES)
         if protocol != CROSS_SENSOR:
-            return self
+            return part
         if isinstance(self.cross_channels, str):
             raise ConfigError(f"protocol {protocol}: {self.cross_channels}")
         trained, tested = self.cross_channels
-        return replace(self, channel_names=tested if subset == "test" else trained)
+        return replace(part, channel_names=tested if subset == "test" else trained)
 
     def labels(self) -> IntArray:
         """(record,) index into `class_names`; -1 for a record that is no example.
 
-        That is one of another class, one that failed, and one that others are compared with.
+        That is one of another class, one that failed, and one that others are compared with. A task
+        `of_references` has the labels of these alone.
         """
         order = {name: index for index, name in enumerate(self.class_names)}
         names = [
@@ -98,11 +105,12 @@ class Task:
         ]
         labels = np.array([order.get(name, -1) for name in names], dtype=np.int64)
         is_example = np.asarray(self.dataset.usable, dtype=bool)
+        is_reference = np.zeros_like(is_example)
         # a stream has examples alone, and no list of its columns
         if IS_REFERENCE in getattr(self.dataset, "column_names", ()):
-            marked = np.asarray(self.dataset.column(IS_REFERENCE)) == 1
-            is_example = is_example & ~marked
-        return np.where(is_example, labels, -1)
+            is_reference = np.asarray(self.dataset.column(IS_REFERENCE)) == 1
+        wanted = is_reference == self.of_references
+        return np.where(is_example & wanted, labels, -1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,13 +161,42 @@ def task_of(
     )
 
 
+def subsets_of(task: Task, protocol: str) -> tuple[str, ...]:
+    """`SUBSETS`, and `REFERENCES` where machines of the validation part have any."""
+    if reference_segments(task, protocol).record.size:
+        return (*SUBSETS, REFERENCES)
+    return SUBSETS
+
+
+def reference_segments(task: Task, protocol: str) -> Segments:
+    """Whole reference records of machines that are in the validation part and in no other.
+
+    There may be none.
+    """
+    record = np.flatnonzero(task.part(protocol, REFERENCES).labels() >= 0)
+    if record.size:
+        unit = np.asarray(task.dataset.column("unit_id"))
+        train, validation, test = (
+            unit[subset_segments(task, protocol, subset).record] for subset in SUBSETS
+        )
+        held_back = np.setdiff1d(validation, np.concatenate([train, test]))
+        record = record[np.isin(unit[record], held_back)]
+    return _whole(task, record)
+
+
 def subset_segments(task: Task, protocol: str, subset: str) -> Segments:
     """Stretches of one subset of a split, records of other classes and failed ones left out.
+
+    Parameters
+    ----------
+    subset : of `subsets_of`
 
     Raises
     ------
     ConfigError    for a protocol or subset that does not exist, or a subset without records
     """
+    if subset == REFERENCES:
+        return reference_segments(task, protocol)
     stored = "by_unit" if protocol == CROSS_SENSOR else protocol
     check_names("protocol", (stored,), task.dataset.protocols)
     check_names("subset", (subset,), SUBSETS)
@@ -187,6 +224,11 @@ def all_segments(task: Task) -> Segments:
         raise DatasetError(
             f"{task.dataset.folder}: no usable record of {', '.join(task.class_names)}"
         )
+    return _whole(task, record)
+
+
+def _whole(task: Task, record: IntArray) -> Segments:
+    """Whole records."""
     length = n_samples(task.dataset)
     return Segments(
         record=record, start=np.zeros_like(record), stop=np.full_like(record, length)

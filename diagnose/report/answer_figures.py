@@ -82,7 +82,9 @@ def detection_figure(path: Path, answers: Content) -> None:
     figure, axes = panels(len(classes), 4.2, 3.8, sharey=True)
     for panel, name in zip(axes, classes, strict=True):
         for index, method in enumerate(_methods(answers)):
-            _detection_lines(panel, answers["detection"][method], name, index, method)
+            detection = answers["detection"][method]
+            if not detection["missing"]:
+                _detection_lines(panel, detection, name, index, method)
         mine = answers["detection"][answers["network"]]["classes"][name]
         _draw_limits(panel, mine["limits"])
         panel.set(xlabel="severity (dotted: false alarms)", ylim=SHARES)

@@ -48,6 +48,8 @@ def _detection_section(folder: Path, answers: Content) -> Section:
                 rows.append([protocol, method, name, *cells, source])
         mine = part["detection"][part["network"]]
         notes += [(protocol, result["summary"]) for result in mine["classes"].values()]
+        if mine["missing"]:
+            notes.append((protocol, f"No share found: {mine['missing']}."))
         if mine["too_many_false_alarms"]:
             warning = (
                 "false alarms are above 5 % here, so that the shares found and the limits are "
@@ -65,7 +67,8 @@ def _detection_section(folder: Path, answers: Content) -> Section:
         title=title,
         text=[
             "A record counts as found if the odds of any fault against healthy are above a "
-            "threshold that is set for 5 % false alarms, whatever class it is then given. AUROC: "
+            "threshold that is set for 5 % false alarms on validation machines, whatever class "
+            "it is then given. AUROC: "
             "chance that a faulty record of the class looks more faulty than a healthy one; 0.5 "
             "is guessing."
         ],

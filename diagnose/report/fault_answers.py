@@ -7,7 +7,8 @@ from typing import Any
 
 from diagnose.data.protocols import MEANING
 from diagnose.report.headlines import headline_protocol, headlines
-from diagnose.scoring.detection_limit import FALSE_ALARMS, too_few_for_curve
+from diagnose.scoring.alarm_threshold import FALSE_ALARMS
+from diagnose.scoring.detection_limit import too_few_for_curve
 from diagnose.scoring.judged import interval_text, too_few_text
 from diagnose.scoring.metrics import is_above
 from diagnose.studies.result_files import Content
@@ -19,6 +20,7 @@ OFTEN, HALF = 0.9, 0.5  # shares of the detection limits
 SEVERITY = "severity"
 NOT_FOUND = "not: no more often than false alarms"
 OPEN = "open: too few records to tell it from false alarms"
+NO_THRESHOLD = "no verdict: no threshold for alarms, see below"
 # Beginning of a size's name -> the whole of which the severity is a share.
 WHOLES = {
     "crack": "of the root chord",
@@ -92,7 +94,8 @@ def found_phrase(result: Mapping[str, Any], false_alarms: Mapping[str, Any]) -> 
 
     "always": 90 % at every tested size. "from" a size on: 90 % from there. "sometimes": more often
     than healthy records raise an alarm. "not": no more often than those, or than the 5 % intended.
-    "open": more often, but the interval holds their share. Too few machines give no verdict.
+    "open": more often, but the interval holds their share. Too few machines, and no threshold,
+    give no verdict.
 
     Parameters
     ----------
@@ -100,6 +103,8 @@ def found_phrase(result: Mapping[str, Any], false_alarms: Mapping[str, Any]) -> 
     false_alarms : share of healthy test records with an alarm, and its interval
     """
     share = result["share_found"]
+    if share["mean"] is None:
+        return NO_THRESHOLD
     if share["low"] is None:
         return f"no verdict: {too_few_text(share)}"
     alarms = false_alarms["mean"] or 0.0
@@ -148,9 +153,13 @@ def _sentence(metrics: Content, protocol: str, detection: Content) -> str:
     if protocol in MEANING:
         meaning = MEANING[protocol].removeprefix("tested ")
         name = f"{protocol} (tested {meaning})"
+    text = f"Network {metrics['model']}, protocol {name}."
+    if detection["missing"]:
+        return text
     return (
-        f"Network {metrics['model']}, protocol {name}. False alarms on healthy test records: "
-        f"{interval_text(detection['false_alarms'])}, 5 % intended."
+        f"{text} False alarms on healthy test records: "
+        f"{interval_text(detection['false_alarms'])}, 5 % intended; threshold from "
+        f"{detection['threshold_from']}."
     )
 
 
@@ -164,6 +173,8 @@ def _notes(detection: Content) -> list[tuple[str, str]]:
         ),
         ("named right", "its own class is the most probable one"),
     ]
+    if detection["missing"]:
+        notes.append(("no verdict", detection["missing"]))
     if detection["too_many_false_alarms"]:
         text = "more than 5 %, so that the lines above are too good"
         notes.append(("false alarms", text))

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from diagnose.report.markdown import table_lines
+from diagnose.scoring.alarm_threshold import FALSE_ALARMS, LEAST_HEALTHY
 from diagnose.scoring.judged import drawn_text, interval_text
 from diagnose.studies.novelty import SCORE_LABELS
-from diagnose.studies.novelty_metrics import (
-    FALSE_ALARMS,
-    LEAST_VALIDATION,
-    TRUE_POSITIVES,
-)
+from diagnose.studies.novelty_metrics import TRUE_POSITIVES
 from diagnose.studies.result_files import Content
 from gensig.text.page import Section, Table
 
@@ -62,9 +59,9 @@ def novelty_caveats(novelty: Content, few_units: int) -> list[str]:
                 f"{name}: only {n_groups} {kind} in the test part; at least {few_units} are "
                 "advisable."
             )
-        if (n_records := result["n_records"]["validation"]) < LEAST_VALIDATION:
+        if (n_records := result["n_records"]["validation"]) < LEAST_HEALTHY:
             lines.append(
-                f"{name}: {n_records} validation record(s); with fewer than {LEAST_VALIDATION} no "
+                f"{name}: {n_records} validation record(s); with fewer than {LEAST_HEALTHY} no "
                 f"threshold promises {FALSE_ALARMS:.0%} of false alarms, "
                 "the largest score is taken."
             )

@@ -11,6 +11,11 @@ from numpy.typing import NDArray
 
 from diagnose.data.groups import groups_of
 from diagnose.data.windows import HEALTHY, FloatArray, IntArray
+from diagnose.scoring.alarm_threshold import (
+    FALSE_ALARMS,
+    LEAST_HEALTHY,
+    alarm_threshold,
+)
 from diagnose.scoring.detection_curve import (
     LEAST_RECORDS,
     LEAST_SIZES,
@@ -22,6 +27,7 @@ from diagnose.scoring.detection_curve import (
 from diagnose.scoring.judged import (
     Interval,
     Judged,
+    finite,
     interval_text,
     share_with_interval,
     with_interval,
@@ -36,10 +42,10 @@ BoolArray = NDArray[np.bool_]
 Sizes = Mapping[
     str, FloatArray
 ]  # quantity -> (record,) values of the records of a class
-FALSE_ALARMS = 0.05
 RECORDS_A_GROUP = 8  # fewer make a share meaningless
 MOST_GROUPS = 5
 CURVE_POINTS = 41
+NO_CURVE: dict[str, list[float]] = {"severity": [], "share_found": []}
 CURVE_NEEDS = f"a curve needs {LEAST_RECORDS} records of {LEAST_SIZES} severities"
 SIZE_FOLLOWS_SEVERITY = (
     0.95  # least rank correlation of a fault parameter that is its size
@@ -55,28 +61,6 @@ def detection_score(log_probability: FloatArray, healthy: int) -> FloatArray:
 
     faulty = np.delete(log_probability, healthy, axis=-1)
     return logsumexp(faulty, axis=-1) - log_probability[..., healthy]
-
-
-def alarm_threshold(scores: FloatArray, weight: CountArray, *, new: bool) -> FloatArray:
-    """(resample,) score above which at most 5 % of healthy records lie.
-
-    With `new`, these are other healthy records of the same kind: the score of rank
-    ceil(0.95 (n + 1)), for which n must be at least 19, else the highest one. Without it, these
-    are the given records: rank ceil(0.95 n).
-
-    Parameters
-    ----------
-    scores : (record,) of healthy records
-    weight : (resample, record) number of times that each was drawn
-
-    Source: Vovk, Gammerman & Shafer (2005), "Algorithmic learning in a random world", chapter 2
-    (conformal prediction).
-    """
-    order = np.argsort(scores, kind="stable")
-    below = np.cumsum(weight[:, order], axis=1)
-    total = below[:, -1]
-    rank = np.minimum(np.ceil((1 - FALSE_ALARMS) * (total + new) - 1e-9), total)
-    return scores[order][np.argmax(below >= rank[:, None], axis=1)]
 
 
 def size_columns(
@@ -123,7 +107,9 @@ class _Alarms:
     drawn : (1 + resample, unit) number of times that each unit was drawn
     seeds : (1 + resample, seed) trainings drawn
     weight : (1 + resample, record) number of times that each record was drawn
-    detected : (1 + resample, record) share of the drawn trainings that raise an alarm
+    detected : (1 + resample, record) share of the drawn trainings that raise an alarm; NaN where
+        there is no threshold
+    has_threshold : whether there is one
     """
 
     judged: Judged
@@ -133,6 +119,7 @@ class _Alarms:
     seeds: IntArray
     weight: FloatArray
     detected: FloatArray
+    has_threshold: bool
 
     def n_units(self, member: BoolArray) -> int:
         """Number of units of some records."""
@@ -180,21 +167,25 @@ class _Alarms:
 
     def of_class(self, member: BoolArray, sizes: Sizes) -> dict[str, Any]:
         """Results of one class, without its summary."""
-        support = self.support(member)
-        detected, weight = self.detected[:, member], self.weight[:, member]
-        severity = sizes.get("severity")
-        limit_rows: list[dict[str, Any]] = []
-        for quantity, size in sizes.items():
-            limit_rows += _limit_rows(quantity, size, detected, weight, support)
-        return {
+        result: dict[str, Any] = {
             "n_records": int(member.sum()),
             "n_units": self.n_units(member),
             "auroc": self.area(member),
             "share_found": self.share(member),
-            "by_severity": self.by_severity(severity, member),
-            "limits": limit_rows,
-            "curve": _curve(severity, detected[:1], weight[:1]),
+            "by_severity": [],
+            "limits": [],
+            "curve": NO_CURVE,
         }
+        if not self.has_threshold:
+            return result
+        support = self.support(member)
+        detected, weight = self.detected[:, member], self.weight[:, member]
+        for quantity, size in sizes.items():
+            result["limits"] += _limit_rows(quantity, size, detected, weight, support)
+        severity = sizes.get("severity")
+        result["by_severity"] = self.by_severity(severity, member)
+        result["curve"] = _curve(severity, detected[:1], weight[:1])
+        return result
 
     def by_severity(
         self, severity: FloatArray | None, member: BoolArray
@@ -232,7 +223,7 @@ def _ratio(part: FloatArray, total: FloatArray) -> FloatArray:
 
 def detection(
     judged: Judged,
-    validation: Judged | None,
+    held_back: Judged | None,
     *,
     class_names: Sequence[str],
     sizes: Mapping[str, Sizes],
@@ -241,13 +232,13 @@ def detection(
 ) -> dict[str, Any]:
     """Faults that one method finds at 5 % false alarms, by class and by size, and its limits.
 
-    The threshold of each training is set on the healthy validation records. For fewer than 19 of
-    them it is set on the healthy test records, as ``threshold_from`` says.
+    The threshold of each training is set on healthy records of other machines. Fewer than
+    `LEAST_HEALTHY` give none: areas alone are told then, and ``missing`` says the reason.
 
     Parameters
     ----------
     judged : one method on the test records
-    validation : the same on the validation records; None if they were not predicted
+    held_back : the same on healthy and reference records of validation machines; None without any
     class_names : one of them "healthy"
     sizes : for each class, sizes (record,) of its test records in their order, by name
     n_bootstrap : resamples of the machines of both parts, so that the intervals include the
@@ -257,7 +248,10 @@ def detection(
     healthy = list(class_names).index(HEALTHY)
     scores = detection_score(judged.log_probability, healthy)
     drawn = _drawn(judged, n_bootstrap, rng)
-    thresholds, source = _thresholds(judged, validation, scores, drawn, healthy, rng)
+    missing = why_no_threshold(held_back)
+    thresholds = np.full((1 + n_bootstrap, judged.n_seeds), np.nan)
+    if held_back is not None and missing is None:
+        thresholds = _thresholds(held_back, healthy, n_bootstrap, rng)
     resampled_seeds = rng.integers(judged.n_seeds, size=(n_bootstrap, judged.n_seeds))
     seeds = np.concatenate([np.arange(judged.n_seeds)[None], resampled_seeds])
     alarms = _Alarms(
@@ -268,6 +262,7 @@ def detection(
         seeds=seeds,
         weight=drawn[:, judged.unit].astype(float),
         detected=_detected(scores, thresholds, seeds),
+        has_threshold=missing is None,
     )
     false_alarms = alarms.share(alarms.healthy)
     classes = {}
@@ -275,16 +270,38 @@ def detection(
         member = judged.label == index
         if index != healthy and member.any():
             result = alarms.of_class(member, sizes.get(name, {}))
-            result["summary"] = _sentence(name, result, false_alarms)
+            result["summary"] = _sentence(name, result, false_alarms, missing)
             classes[name] = result
     return {
         "method": judged.method,
         "false_alarms_wanted": FALSE_ALARMS,
-        "threshold_from": source,
+        "missing": missing,
+        "threshold": [finite(value) for value in thresholds[0]],
+        "threshold_from": _source(held_back),
         "false_alarms": false_alarms,
         "too_many_false_alarms": is_above(false_alarms, FALSE_ALARMS),
         "classes": classes,
     }
+
+
+def why_no_threshold(held_back: Judged | None) -> str | None:
+    """Reason why healthy records of validation machines give no threshold; None if they do."""
+    n_records = 0 if held_back is None else held_back.label.size
+    if n_records >= LEAST_HEALTHY:
+        return None
+    return (
+        f"a threshold for {FALSE_ALARMS:.0%} false alarms needs {LEAST_HEALTHY} healthy or "
+        f"reference records of validation machines, and there are {n_records}: "
+        "raise plan.n_units or plan.n_reference"
+    )
+
+
+def _source(held_back: Judged | None) -> str:
+    """Records that a threshold is set on, in words."""
+    if held_back is None:
+        return "no healthy record of a validation machine"
+    n_units = np.unique(held_back.unit).size
+    return f"{held_back.label.size} healthy records of {n_units} validation machines"
 
 
 def _drawn(judged: Judged, n_bootstrap: int, rng: np.random.Generator) -> CountArray:
@@ -294,36 +311,26 @@ def _drawn(judged: Judged, n_bootstrap: int, rng: np.random.Generator) -> CountA
 
 
 def _thresholds(
-    judged: Judged,
-    validation: Judged | None,
-    scores: FloatArray,
-    drawn: CountArray,
-    healthy: int,
-    rng: np.random.Generator,
-) -> tuple[FloatArray, str]:
-    """(1 + resample, seed) thresholds, and the part that they were set on."""
-    member = judged.label == healthy
-    weight, values = drawn[:, judged.unit[member]], scores[:, member]
-    new, source = False, "healthy test records"
-    if validation is not None:
-        part = validation.of(validation.label == healthy)
-        new = part.label.size + 1 >= 1 / FALSE_ALARMS - 1e-9
-        if new:
-            source = "healthy validation records"
-            weight = _drawn(part, len(drawn) - 1, rng)[:, part.unit]
-            values = detection_score(part.log_probability, healthy)
+    held_back: Judged, healthy: int, n_bootstrap: int, rng: np.random.Generator
+) -> FloatArray:
+    """(1 + resample, seed) thresholds, all machines once and then resampled."""
+    weight = _drawn(held_back, n_bootstrap, rng)[:, held_back.unit]
     weight[weight.sum(axis=1) == 0] = 1  # a resample without a healthy record
-    thresholds = [alarm_threshold(row, weight, new=new) for row in values]
-    return np.stack(thresholds, axis=1), source
+    scores = detection_score(held_back.log_probability, healthy)
+    return np.stack([alarm_threshold(row, weight) for row in scores], axis=1)
 
 
 def _detected(
     scores: FloatArray, thresholds: FloatArray, seeds: IntArray
 ) -> NDArray[np.float32]:
-    """(1 + resample, record) share of the trainings drawn whose score is above their threshold."""
-    detected = np.empty((len(seeds), scores.shape[1]), dtype=np.float32)
-    for row, drawn in enumerate(seeds):
-        detected[row] = (scores[drawn] > thresholds[row, drawn, None]).mean(axis=0)
+    """(1 + resample, record) share of the trainings drawn whose score is above their threshold.
+
+    NaN without thresholds.
+    """
+    detected = np.full((len(seeds), scores.shape[1]), np.nan, dtype=np.float32)
+    if np.isfinite(thresholds).all():
+        for row, drawn in enumerate(seeds):
+            detected[row] = (scores[drawn] > thresholds[row, drawn, None]).mean(axis=0)
     return detected
 
 
@@ -372,13 +379,17 @@ def _curve(
 ) -> dict[str, list[float]]:
     """The fitted curve over severity, for figures; empty if there is none."""
     if severity is None or not _has_curve(severity):
-        return {"severity": [], "share_found": []}
+        return NO_CURVE
     at = np.linspace(severity.min(), severity.max(), CURVE_POINTS)
     share = curve_at(fit_curves(severity, detected, weight), at, severity)[0]
     return {"severity": at.tolist(), "share_found": share.tolist()}
 
 
-def _sentence(name: str, result: Mapping[str, Any], false_alarms: Interval) -> str:
+def _sentence(
+    name: str, result: Mapping[str, Any], false_alarms: Interval, missing: str | None
+) -> str:
+    if missing is not None:
+        return f"{name}: AUROC {interval_text(result['auroc'])}; {missing}."
     text = f"{name}: {interval_text(result['share_found'])} of {records_behind(result)} found "
     if false_alarms["mean"] is not None:
         text += f"at {false_alarms['mean']:.0%} false alarms"

@@ -147,24 +147,39 @@ def with_interval(value: float, resampled: FloatArray, support: Support) -> Inte
 def share_with_interval(
     value: float, resampled: FloatArray, support: Support
 ) -> Interval:
-    """A share with its interval, also for 0 or 1.
+    """A share of records with its interval.
 
-    As `with_interval`. All resamples of a share of 0 or 1 are the same. Its interval is therefore
-    extended to that of as many independent trials as there are groups of machines.
+    It is the exact interval of as many independent trials as there are groups of machines, extended
+    to that of `with_interval`, which has the spread of trainings and thresholds too. A resample of
+    few groups cannot show what none of them did.
 
     Source: Clopper & Pearson (1934), "The use of confidence or fiducial limits illustrated in the
     case of the binomial", Biometrika 26 (4).
     """
-    from scipy.stats import binomtest
-
     interval = with_interval(value, resampled, support)
     low, high = interval["low"], interval["high"]
-    if value in (0.0, 1.0) and low is not None and high is not None:
-        trials = binomtest(round(value * support.n_groups), support.n_groups)
-        exact = trials.proportion_ci(0.95, method="exact")
-        interval["low"] = min(low, float(exact.low))
-        interval["high"] = max(high, float(exact.high))
+    if low is not None and high is not None:
+        exact = exact_interval(value, support.n_groups)
+        interval["low"] = min(low, exact[0])
+        interval["high"] = max(high, exact[1])
     return interval
+
+
+def exact_interval(share: float, n_trials: int) -> tuple[float, float]:
+    """95 % interval of a share of independent trials, which need not be a whole number of them.
+
+    Source: as `share_with_interval`; its quantiles of the beta distribution take any share.
+    """
+    from scipy.stats import beta
+
+    hits = share * n_trials
+    misses = n_trials - hits
+    low, high = 0.0, 1.0
+    if hits > 0:
+        low = float(beta.ppf(0.025, hits, misses + 1))
+    if misses > 0:
+        high = float(beta.ppf(0.975, hits + 1, misses))
+    return low, high
 
 
 def finite(value: float) -> float | None:

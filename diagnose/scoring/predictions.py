@@ -47,6 +47,8 @@ class Prediction:
         ranks in the same order
     detail : description of the fit or training
     validation : the same for the validation records; None if they are test records too
+    references : the same for the reference records of the validation machines; None without any,
+        and of methods that compare with them
     windows : of networks only, for each window of the test records
     weights, domain, best_epoch, validation_loss, temperature, last_predicted : of
         networks only; `temperature` as in `diagnose.networks.calibration`, `last_predicted`
@@ -64,6 +66,7 @@ class Prediction:
     log_probability: FloatArray
     detail: str
     validation: Rows | None = None
+    references: Rows | None = None
     windows: Rows | None = None
     weights: dict[str, NDArray[Any]] | None = None
     domain: Domain | None = None
@@ -74,6 +77,19 @@ class Prediction:
     heads: Mapping[str, FloatArray] = field(default_factory=dict)
     entries: Mapping[str, FloatArray] = field(default_factory=dict)
     n_followed: int | None = None
+
+    @property
+    def held_back(self) -> Rows | None:
+        """The validation and the reference records, whose machines are not scored; None of none."""
+        parts = [
+            part for part in (self.validation, self.references) if part is not None
+        ]
+        if not parts:
+            return None
+        return Rows(
+            record=np.concatenate([part.record for part in parts]),
+            log_probability=np.concatenate([part.log_probability for part in parts]),
+        )
 
     @property
     def predicted(self) -> IntArray:

@@ -6,6 +6,7 @@ Conditions in which it fails, severities that are found, length of signal, compa
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial, reduce
 
 import numpy as np
@@ -18,11 +19,11 @@ from diagnose.scoring.conditions import by_condition, condition_columns
 from diagnose.scoring.detection_limit import HEALTHY, detection, size_columns
 from diagnose.scoring.judged import Judged, resampled_score, score, with_interval
 from diagnose.scoring.machines import machines_of
-from diagnose.scoring.metrics import balanced_accuracy
 from diagnose.scoring.paired import ACCURACY, compare
 from diagnose.scoring.predictions import Prediction
 from diagnose.scoring.window_length import by_window_length
 from diagnose.settings import TrainSettings
+from diagnose.studies.controls import best_on_validation
 from diagnose.studies.counts import unit_ids
 from diagnose.studies.result_files import Entry, network_name
 
@@ -57,7 +58,7 @@ def protocol_answers(
         method: _judged(task, method, mine, record) for method, mine in runs.items()
     }
     network = rivals.pop(name)
-    best = max(rivals.values(), key=_accuracy, default=None)
+    best = rivals.get(best_on_validation(task, predictions, rivals) or "")
     shown = [method for method in (network, best) if method is not None]
     n_bootstrap = settings.n_bootstrap
     columns = condition_columns(task.dataset, record)
@@ -83,7 +84,7 @@ def protocol_answers(
         result["detection"] = {
             method.method: detect(
                 method,
-                _validation(task, method.method, runs[method.method]),
+                _held_back(task, method.method, runs[method.method]),
                 rng=_generator(),
             )
             for method in shown
@@ -162,30 +163,40 @@ def _judged(
     return _of_records(task, method, record, np.stack(scores))
 
 
-def _validation(task: Task, method: str, runs: Sequence[Prediction]) -> Judged | None:
-    """A method on its validation records; None where one of its runs has none."""
-    parts = [run.validation for run in runs if run.validation is not None]
-    if len(parts) < len(runs):
+def _held_back(task: Task, method: str, runs: Sequence[Prediction]) -> Judged | None:
+    """A method on healthy and reference records of validation machines; None without any."""
+    rows = [run.held_back for run in runs if run.held_back is not None]
+    if len(rows) < len(runs):
         return None
-    scores = np.stack([part.log_probability for part in parts])
-    return _of_records(task, method, parts[0].record, scores)
+    healthy = task.class_names.index(HEALTHY)
+    is_healthy = task.labels() == healthy
+    is_healthy |= replace(task, of_references=True).labels() == healthy
+    chosen = is_healthy[rows[0].record]
+    if not chosen.any():
+        return None
+    scores = np.stack([one.log_probability[chosen] for one in rows])
+    return _of_records(task, method, rows[0].record[chosen], scores, label=healthy)
 
 
 def _of_records(
-    task: Task, method: str, record: IntArray, scores: FloatArray
+    task: Task,
+    method: str,
+    record: IntArray,
+    scores: FloatArray,
+    label: int | None = None,
 ) -> Judged:
+    """A method on some records, all of one label where it is given."""
     unit = np.unique(unit_ids(task)[record], return_inverse=True)[1]
+    labels = task.labels()[record]
+    if label is not None:
+        labels = np.full_like(record, label)
     return Judged(
         method=method,
-        label=task.labels()[record],
+        label=labels,
         unit=unit,
         machines=machines_of(task.dataset, record),
         log_probability=scores,
     )
-
-
-def _accuracy(judged: Judged) -> float:
-    return float(balanced_accuracy(judged.confusion().sum(axis=1)).mean())
 
 
 def _sizes(task: Task, record: IntArray) -> dict[str, dict[str, FloatArray]]:

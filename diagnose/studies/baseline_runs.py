@@ -9,6 +9,7 @@ import numpy as np
 
 from diagnose.baselines.base import Baseline, Input, Parts, Source, StorableBaseline
 from diagnose.baselines.estimators import record_scores
+from diagnose.baselines.features import FeatureTable
 from diagnose.baselines.registry import BASELINES
 from diagnose.data.windows import Task
 from diagnose.scoring.predictions import Prediction, Rows
@@ -105,7 +106,16 @@ def _prediction(baseline: Baseline, parts: Parts, source: Source) -> Prediction:
     judged = parts.judged()
     record, scores = record_scores(baseline.predict_proba(judged), judged.record)
     tested = np.isin(record, parts.test.record)
-    held_out = Rows(record=record[~tested], log_probability=scores[~tested])
+
+    def rows_of(table: FeatureTable | None) -> Rows | None:
+        """Scores of the records of a part beside the test; None without any."""
+        if table is None:
+            return None
+        mine = np.isin(record, table.record) & ~tested
+        if not mine.any():
+            return None
+        return Rows(record=record[mine], log_probability=scores[mine])
+
     weights = None
     if isinstance(baseline, StorableBaseline):
         weights = baseline.tensors()
@@ -116,6 +126,7 @@ def _prediction(baseline: Baseline, parts: Parts, source: Source) -> Prediction:
         record=record[tested],
         log_probability=scores[tested],
         detail=detail,
-        validation=held_out if held_out.record.size else None,
+        validation=rows_of(parts.validation),
+        references=rows_of(parts.references),
         weights=weights,
     )

@@ -49,7 +49,8 @@ def with_canaries(rows: Labelled, labels: IntArray | None) -> Labelled:
 
 def parts_with_canaries(parts: Parts, labels: IntArray | None) -> Parts:
     """The tables of the three subsets with the labels of `canary_labels`."""
-    return Parts(
+    return replace(
+        parts,
         train=with_canaries(parts.train, labels),
         validation=with_canaries(parts.validation, labels),
         test=with_canaries(parts.test, labels),

@@ -17,7 +17,14 @@ from diagnose.data.inputs import NetworkInput
 from diagnose.data.protocols import HEALTHY_ONLY, OPEN_PROTOCOLS
 from diagnose.data.turns import REFERENCE
 from diagnose.data.window_input import Windows
-from diagnose.data.windows import SUBSETS, Task, WindowSet, subset_segments
+from diagnose.data.windows import (
+    REFERENCES,
+    SUBSETS,
+    Task,
+    WindowSet,
+    subset_segments,
+    subsets_of,
+)
 from diagnose.networks.domain import Domain, fit_domain
 from diagnose.networks.network import Network
 from diagnose.networks.registry import input_of
@@ -192,6 +199,9 @@ def _run_training(
     prediction = counted(prediction, canaries)
     if shuffled:
         return prediction
+    if REFERENCES in sets:
+        references = rows_of_records(model, sets[REFERENCES])
+        prediction = replace(prediction, references=references)
     prediction = _with_further_answers(prediction, training, test)
     if control not in ("", WITH_REFERENCE):
         return prediction
@@ -283,12 +293,21 @@ def _windows(
                 subset_segments(task, protocol, name),
                 training=name == "train",
             )
-            for name in SUBSETS
+            for name in _subsets(task, protocol, control, inputs)
         }
     sets = _loaded[key]
     if control == LEVEL_KEPT:
         return {name: replace(part, normalise="none") for name, part in sets.items()}
     return sets
+
+
+def _subsets(
+    task: Task, protocol: str, control: str, inputs: NetworkInput
+) -> tuple[str, ...]:
+    """Subsets to load; references stand alone, and have no twin of an oracle."""
+    if inputs.compares or control == ORACLE or protocol in OPEN_PROTOCOLS:
+        return SUBSETS
+    return subsets_of(task, protocol)
 
 
 def _sham(task: Task, settings: TrainSettings) -> Task:

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.windows import Task
+from diagnose.scoring.alarm_threshold import FALSE_ALARMS, alarm_threshold
+from diagnose.scoring.judged import exact_interval
 from diagnose.scoring.machines import Machines, machines_of
 from diagnose.scoring.metrics import Score, percentile_interval, score_with_interval
 from diagnose.studies.counts import (
@@ -29,25 +31,7 @@ from gensig.errors import ConfigError
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
 Mask = NDArray[np.bool_]
-FALSE_ALARMS = 0.05  # share of known records that the threshold is meant to call novel
 TRUE_POSITIVES = 0.95  # of FPR95
-LEAST_VALIDATION = 19  # records: with fewer no threshold promises the share
-
-
-def alarm_threshold(validation_score: FloatArray) -> float:
-    """Score that a new known record exceeds with a probability of at most `FALSE_ALARMS`.
-
-    The score of rank (n + 1) (1 - share), rounded up, of n validation scores. Fewer than
-    `LEAST_VALIDATION` cannot promise the share: then it is the largest. Records of one unit
-    resemble each other, so that the promise is weaker than it reads; the share on test units
-    shows the outcome.
-
-    Source: Shafer & Vovk (2008), "A tutorial on conformal prediction", Journal of Machine
-    Learning Research 9.
-    """
-    n = validation_score.size
-    rank = min(int(np.ceil((n + 1) * (1 - FALSE_ALARMS) - 1e-9)), n)
-    return float(np.sort(validation_score)[rank - 1])
 
 
 def false_positive_rate_95(
@@ -171,7 +155,7 @@ def _rows(task: Task, runs: Sequence[NoveltyRun]) -> Iterator[Entry]:
     labels, unit = task.labels(), unit_ids(task)
     ids = np.asarray(task.dataset.column("record_id"))
     for run in runs:
-        threshold = f"{alarm_threshold(run.validation_score):.9g}"
+        (threshold,) = alarm_threshold(run.validation_score)
         for record, score in zip(run.record, run.score, strict=True):
             yield {
                 "protocol": run.protocol,
@@ -181,7 +165,7 @@ def _rows(task: Task, runs: Sequence[NoveltyRun]) -> Iterator[Entry]:
                 "unit_id": unit[record],
                 "label": task.class_names[labels[record]],
                 "score": f"{score:.9g}",
-                "threshold": threshold,
+                "threshold": f"{threshold:.9g}",
             }
 
 
@@ -261,7 +245,7 @@ def novelty_result(
     resamples = _Resamples(unit=unit, machines=machines, drawn=drawn, seeds=seeds)
     novel = ~np.isin(label, known)
     scores = np.stack([run.score for run in runs])
-    threshold = np.array([alarm_threshold(run.validation_score) for run in runs])
+    threshold = np.concatenate([alarm_threshold(run.validation_score) for run in runs])
     alarm = scores > threshold[:, None]
     of_class = {task.class_names[index]: label == index for index in np.unique(label)}
     new = {name: mine for name, mine in of_class.items() if novel[mine].any()}
@@ -329,7 +313,13 @@ def _share(alarm: Mask, chosen: Mask, resamples: _Resamples) -> Entry:
     hits = np.stack([resamples.count(chosen, row[chosen]) for row in alarm])
     total = resamples.drawn @ resamples.count(chosen)
     per_seed = [float(row[chosen].mean()) for row in alarm]
-    return resamples.score(per_seed, _ratio(resamples.drawn @ hits.T, total))
+    score = resamples.score(per_seed, _ratio(resamples.drawn @ hits.T, total))
+    if score["low"] is None:
+        return score
+    support = resamples.machines.support(np.unique(resamples.unit[chosen]))
+    exact = exact_interval(score["mean"], support.n_groups)
+    ends = {"low": min(score["low"], exact[0]), "high": max(score["high"], exact[1])}
+    return score | ends
 
 
 def _false_positives(scores: FloatArray, novel: Mask, resamples: _Resamples) -> Entry:

@@ -18,11 +18,13 @@ from diagnose.data.protocols import OPEN_PROTOCOLS, channels_to_cross, choose_pr
 from diagnose.data.window_choice import chosen_window
 from diagnose.data.windows import (
     NORMALISATIONS,
+    REFERENCES,
     SUBSETS,
     Segments,
     Task,
     check_names,
     subset_segments,
+    subsets_of,
     task_of,
 )
 from diagnose.networks.registry import (
@@ -103,11 +105,12 @@ def plan_study(
 def _checked_parts(task: Task, protocol: str) -> list[Segments]:
     """Stretches of every subset of a protocol; refuses one that cannot be judged."""
     labels = task.labels()
+    is_open = protocol in OPEN_PROTOCOLS
     parts = []
-    for subset in SUBSETS:
+    for subset in SUBSETS if is_open else subsets_of(task, protocol):
         segments = subset_segments(task, protocol, subset)
         parts.append(segments)
-        if protocol in OPEN_PROTOCOLS or subset == "validation":
+        if is_open or subset in ("validation", REFERENCES):
             continue
         present = np.unique(labels[segments.record])
         if present.size < 2:
@@ -115,7 +118,7 @@ def _checked_parts(task: Task, protocol: str) -> list[Segments]:
             raise ConfigError(
                 f"protocol {protocol}: one class only in its {subset} part ({name})"
             )
-    if protocol in OPEN_PROTOCOLS:
+    if is_open:
         check_open_protocol(task, protocol)
     return parts
 

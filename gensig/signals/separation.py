@@ -34,6 +34,15 @@ class GearTurns:
     driven: FloatArray
     mesh: FloatArray
 
+    def of_channel(self, index: int) -> GearTurns:
+        """Turns of one channel, the first axis, which keeps its axis."""
+        chosen = slice(index, index + 1)
+        return GearTurns(
+            driving=self.driving[chosen],
+            driven=self.driven[chosen],
+            mesh=self.mesh[chosen],
+        )
+
 
 def separate_gears(
     signal: ArrayLike,

@@ -22,10 +22,10 @@ from diagnose.baselines.base import Role
 from diagnose.baselines.registry import BASELINES, baseline_names
 from diagnose.data import lives as life_data
 from diagnose.data.windows import Segments, subset_segments
+from diagnose.scoring.alarm_threshold import alarm_threshold
 from diagnose.studies import jobs, life_jobs
 from diagnose.studies import novelty as novelty_runs
 from diagnose.studies.jobs import ORACLE, PROBE, Job
-from diagnose.studies.novelty_metrics import alarm_threshold
 from diagnose.studies.study import task_from
 
 HUGE = 1e6
@@ -54,14 +54,16 @@ OF_TEST = (
 class Poisoned:
     """A data set in memory whose records of one subset have other labels, rows and signals."""
 
-    def __init__(self, dataset, subset):
+    def __init__(self, dataset, subset, *, signals_alone=False):
         self._dataset = dataset
         record = [row[0] for row in dataset.split("by_unit")[subset]]
         self.is_poisoned = np.isin(np.arange(dataset.n_records), record)
-        self.columns = {
-            name: np.where(self.is_poisoned, self._garbage(name, values), values)
-            for name, values in dataset.columns.items()
-        }
+        self.columns = dict(dataset.columns)
+        if signals_alone:
+            return
+        for name, values in dataset.columns.items():
+            garbage = self._garbage(name, values)
+            self.columns[name] = np.where(self.is_poisoned, garbage, values)
 
     def __getattr__(self, name):
         return getattr(self._dataset, name)

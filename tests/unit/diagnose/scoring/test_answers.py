@@ -289,6 +289,25 @@ def test_every_part_is_there_and_can_be_written(study, tmp_path):
     assert rows[0] == "by_unit,False,cnn,balanced_accuracy,0.5,0.4,0.6,1,80,5"
 
 
+def test_the_best_baseline_is_chosen_on_validation_machines(study):
+    """Not on the test records, where another one is better."""
+    task, settings, runs = study
+    indicators, label = runs[-1], task.labels()
+    lucky = dataclasses.replace(
+        indicators,
+        method="minirocket",
+        log_probability=scores_of(label[indicators.record]),
+        validation=dataclasses.replace(
+            indicators.validation,
+            log_probability=scores_of(np.zeros_like(indicators.validation.record)),
+        ),
+    )
+    answers = protocol_answers(task, settings, [*runs, lucky])
+    assert answers["best_baseline"] == "indicators"
+    against = {row["against"]: row["difference"] for row in answers["comparisons"]}
+    assert against["minirocket"]["mean"] < against["indicators"]["mean"]
+
+
 @pytest.fixture
 def axes(monkeypatch):
     """Axes of the figures that are drawn."""

@@ -7,18 +7,18 @@ import pytest
 from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from scipy.special import expit
-from scipy.stats import zscore
+from scipy.stats import binomtest, zscore
 from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import roc_auc_score
 
+from diagnose.scoring.alarm_threshold import LEAST_HEALTHY, alarm_threshold
 from diagnose.scoring.detection_curve import curve_at, fit_curves, limits
 from diagnose.scoring.detection_limit import (
-    alarm_threshold,
     detection,
     detection_score,
     size_columns,
 )
-from diagnose.scoring.judged import Judged, share_with_interval
+from diagnose.scoring.judged import Judged, exact_interval, share_with_interval
 from diagnose.scoring.machines import Machines, Support
 
 
@@ -52,15 +52,21 @@ def cracks():
     return study()
 
 
+def held_back(n_units=20, per_unit=20):
+    """Healthy records of validation machines."""
+    judged_there, _ = study(n_units=n_units, per_unit=per_unit, seed=1)
+    return judged_there.of(judged_there.label == 0)
+
+
 @pytest.fixture(scope="module")
 def validation():
-    return study(seed=1)[0]
+    return held_back()
 
 
-def answer(test, validation, severity):
+def answer(test, healthy_elsewhere, severity):
     return detection(
         test,
-        validation,
+        healthy_elsewhere,
         class_names=("healthy", "crack"),
         sizes={"crack": {"severity": severity, "crack_depth_mm": 4 * severity}},
         n_bootstrap=200,
@@ -72,7 +78,7 @@ def crack_with(score, cracks):
     """Result of the cracks for other scores."""
     test, severity = cracks
     other = judged(score, test.label, test.unit)
-    return answer(other, None, severity)["classes"]["crack"]
+    return answer(other, held_back(), severity)["classes"]["crack"]
 
 
 @pytest.mark.parametrize("offset", [0, 7])
@@ -89,21 +95,14 @@ def test_the_score_ranks_by_the_odds_of_any_fault_without_offset(offset):
 def test_at_most_one_in_twenty_new_healthy_records_is_an_alarm(n_records):
     rng = default_rng(n_records)
     known, new = rng.normal(size=(300, n_records)), rng.normal(size=(300, 200))
-    once = np.ones((1, n_records), dtype=int)
-
-    def threshold(scores, is_new):
-        return alarm_threshold(scores, once, new=is_new)[0]
-
-    alarms = new > np.array([[threshold(scores, True)] for scores in known])
-
+    alarms = new > np.array([alarm_threshold(scores) for scores in known])
     assert 0.02 < np.mean(alarms) < 0.055
-    assert np.mean(known[0] > threshold(known[0], False)) <= 0.05
 
 
 def test_a_repeated_record_counts_as_often_as_it_was_drawn():
     values, counts = np.array([3.0, 1.0, 2.0]), np.array([[1, 30, 9]])
     expanded = np.repeat(values, counts[0])
-    assert alarm_threshold(values, counts, new=False)[0] == np.sort(expanded)[38 - 1]
+    assert alarm_threshold(values, counts)[0] == np.sort(expanded)[39 - 1]
 
 
 def test_curves_are_those_of_ordinary_logistic_regression():
@@ -164,7 +163,8 @@ def test_limits_stay_within_the_tested_sizes_and_curves_never_fall():
 def test_a_known_limit_lies_in_the_interval(cracks, validation):
     test, severity = cracks
     result = answer(test, validation, severity)
-    assert result["threshold_from"] == "healthy validation records"
+    source = "200 healthy records of 20 validation machines"
+    assert result["threshold_from"] == source
     assert result["false_alarms"]["low"] < 0.06
     assert not result["too_many_false_alarms"]
 
@@ -217,25 +217,33 @@ def test_too_many_false_alarms_are_reported(validation):
     assert answer(test, validation, severity)["too_many_false_alarms"]
 
 
-def test_few_healthy_validation_records_are_not_used(cracks):
+@pytest.mark.parametrize("healthy_elsewhere", [None, held_back(n_units=2, per_unit=18)])
+def test_without_enough_healthy_records_elsewhere_no_alarm_is_told(
+    cracks, healthy_elsewhere
+):
+    """The records that are scored never set the threshold."""
     test, severity = cracks
-    result = answer(
-        test,
-        study(n_units=2, per_unit=18)[0],
-        severity,
-    )
-    assert result["threshold_from"] == "healthy test records"
-    assert result["false_alarms"]["mean"] <= 0.05
+    result = answer(test, healthy_elsewhere, severity)
+    n_records = 0 if healthy_elsewhere is None else 18
+    assert f"needs {LEAST_HEALTHY} healthy" in result["missing"]
+    assert f"there are {n_records}:" in result["missing"]
+    assert result["threshold"] == [None, None]
+    crack = result["classes"]["crack"]
+    assert result["false_alarms"]["mean"] is crack["share_found"]["mean"] is None
+    assert crack["limits"] == crack["by_severity"] == []
+    assert crack["auroc"]["low"] > 0.6
+    assert "AUROC" in crack["summary"]
+    assert result["missing"] in crack["summary"]
 
 
 def test_one_unit_has_no_interval_and_one_severity_no_curve():
     test, severity = study(n_units=1, per_unit=60)
-    crack = answer(test, None, severity)["classes"]["crack"]
+    crack = answer(test, held_back(), severity)["classes"]["crack"]
     scores = (crack["auroc"], crack["share_found"], *crack["limits"])
 
     assert all(score["low"] is None for score in scores)
 
-    flat = answer(test, None, np.ones_like(severity))["classes"]["crack"]
+    flat = answer(test, held_back(), np.ones_like(severity))["classes"]["crack"]
     assert flat["by_severity"] == flat["limits"] == flat["curve"]["severity"] == []
 
 
@@ -249,16 +257,20 @@ def test_all_of_few_units_do_not_prove_a_share_of_one():
     )
     assert interval["high"] == 1
 
-    half = share_with_interval(
-        0.5,
-        np.linspace(0.3, 0.7, 101),
-        eight,
-    )
+
+def test_the_interval_of_a_rate_is_exact_over_groups_of_machines():
+    """As many independent trials, whatever few resamples show; more where these spread more."""
+    twenty = Support(kind="machines", n_groups=20)
+    one_of_twenty = share_with_interval(0.05, np.full(50, 0.05), twenty)
+    exact = binomtest(1, 20).proportion_ci(0.95, method="exact")
     assert_allclose(
-        [half["low"], half["high"]],
-        [0.31, 0.69],
-        rtol=0.01,
+        [one_of_twenty["low"], one_of_twenty["high"]], [exact.low, exact.high]
     )
+    assert 0.24 < exact.high < 0.25
+    spread = share_with_interval(0.5, np.linspace(0, 1, 101), twenty)
+    assert_allclose([spread["low"], spread["high"]], [0.02, 0.98], atol=0.011)
+    half = exact_interval(0.125, 4)  # half a success
+    assert exact_interval(0.0, 4)[1] < half[1] < exact_interval(0.25, 4)[1]
 
 
 def test_only_parameters_that_grow_with_the_severity_are_sizes():

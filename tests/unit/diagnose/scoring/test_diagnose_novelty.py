@@ -15,11 +15,11 @@ from scipy.stats import norm
 from small_studies import LEARNS, TINY_CNN, run, study_of, train, windows_of
 
 from diagnose.data.windows import SUBSETS, subset_segments
+from diagnose.scoring.alarm_threshold import alarm_threshold
 from diagnose.studies import novelty
 from diagnose.studies.jobs import Job
 from diagnose.studies.novelty import NoveltyRun, network_outputs, trained_runs
 from diagnose.studies.novelty_metrics import (
-    alarm_threshold,
     false_positive_rate_95,
     novelty_protocol_result,
     novelty_result,
@@ -137,7 +137,9 @@ def test_perfect_and_empty_scores(labelled):
     perfect = judge(novel * 5.0, predicted=record)
     assert perfect["auroc"]["low"] == perfect["auroc"]["mean"] == 1
     assert perfect["false_alarms"]["mean"] == perfect["fpr95"]["mean"] == 0
-    assert all(result["low"] == 1 for result in perfect["found"].values())
+    for found in perfect["found"].values():
+        assert found["mean"] == found["high"] == 1
+        assert 0.2 < found["low"] < 1  # exact, of few machines
 
     empty = judge(
         np.zeros(novel.size),
@@ -178,7 +180,7 @@ def test_interval_covers_the_seeds(labelled):
 )
 def test_new_known_records_raise_no_more_alarms_than_promised(n):
     rng = default_rng(n)
-    thresholds = [alarm_threshold(rng.standard_normal(n)) for _ in range(2000)]
+    thresholds = [alarm_threshold(rng.standard_normal(n))[0] for _ in range(2000)]
     shares = norm.sf(thresholds)
     assert 0.05 - 1 / (n + 1) < np.mean(shares) < 0.05 + 4 * np.std(shares) / 44
 

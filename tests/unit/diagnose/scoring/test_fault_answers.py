@@ -10,6 +10,7 @@ from runs import metrics_of, train
 from small_studies import two_channels
 
 from diagnose.report.fault_answers import (
+    NO_THRESHOLD,
     NOT_FOUND,
     OPEN,
     fault_answers,
@@ -25,7 +26,12 @@ from diagnose.scoring.machines import Machines
 SEVERITY = np.linspace(0.1, 0.9, 200)
 
 
-def detected(is_found, *, n_units=20, sizes=None):
+def scores_apart(score):
+    """Log-probabilities of two classes with a given detection score, (seed, record)."""
+    return np.stack([np.zeros_like(score), score], axis=-1)
+
+
+def detected(is_found, *, n_units=20, sizes=None, threshold=True):
     """Detection of cracks of `SEVERITY` that raise an alarm exactly where they are found."""
     n_cracks = len(is_found)
     label = np.repeat([0, 1], [200, n_cracks])
@@ -37,13 +43,20 @@ def detected(is_found, *, n_units=20, sizes=None):
         label=label,
         unit=unit,
         machines=Machines.alone(n_units),
-        log_probability=np.stack([np.zeros_like(score), score], axis=-1),
+        log_probability=scores_apart(score),
+    )
+    healthy_elsewhere = Judged(
+        method="cnn",
+        label=np.zeros(400, dtype=int),
+        unit=np.arange(400) % 20,
+        machines=Machines.alone(20),
+        log_probability=scores_apart(default_rng(5).normal(size=(1, 400))),
     )
     if sizes is None:
         sizes = {"severity": SEVERITY, "crack_depth_mm": 4.0 * SEVERITY}
     return detection(
         judged,
-        None,
+        healthy_elsewhere if threshold else None,
         class_names=("healthy", "crack"),
         sizes={"crack": sizes},
         n_bootstrap=100,
@@ -99,6 +112,14 @@ def test_too_few_records_give_no_size_and_too_few_machines_no_verdict():
     assert phrase(detected(np.arange(9) > 6, sizes=sizes)) == OPEN
     few = detected(np.ones(200, dtype=bool), n_units=3)
     assert phrase(few) == "no verdict: too few machines"
+
+
+def test_without_a_threshold_there_is_no_verdict_and_the_page_says_what_is_missing():
+    result = detected(np.ones(200, dtype=bool), threshold=False)
+    assert phrase(result) == NO_THRESHOLD
+    section = fault_section(metrics_with(result))
+    assert ("no verdict", result["missing"]) in section.notes
+    assert "False alarms" not in section.text[0]
 
 
 def score(mean, low, high):
