@@ -173,24 +173,20 @@ def _verdict(result: Content, score: Content, chance: float) -> tuple[list[str],
 def _best_rival(result: Content, score: Content) -> list[str]:
     """Comparison of the network's score with the best baseline; empty where none ran.
 
-    A baseline whose control failed is none.
+    It is the best one on validation machines, whose controls hold.
     """
-    methods = result["methods"]
-    means = {
-        label: methods[name]["balanced_accuracy"]["mean"]
-        for name, label in rivals_on_cards().items()
-        if name in methods and not failed_controls(result, name)
-    }
-    if not means:
+    best = result["answers"]["best_baseline"]
+    if best is None:
         return []
-    best = max(means, key=lambda label: means[label])
+    label = rivals_on_cards().get(best, best)
+    mean = result["methods"][best]["balanced_accuracy"]["mean"]
     # an interval that holds the other's mean tells the two apart neither way
     comparison = "not told from"
-    if score["low"] > means[best]:
+    if score["low"] > mean:
         comparison = "better than"
-    elif score["high"] < means[best]:
+    elif score["high"] < mean:
         comparison = "worse than"
-    return [f"{comparison} {best} ({means[best]:.2f})"]
+    return [f"{comparison} {label} ({mean:.2f})"]
 
 
 def _spread(score: Content) -> str:

@@ -57,9 +57,9 @@ def by_unit(trained):
 def test_train_writes_what_it_promises(trained, by_unit):
     names = sorted(path.name for path in trained.iterdir())
     assert " ".join(names) == (
-        "by_severity.csv comparisons.csv confusion_by_unit.csv confusion_by_unit.png "
+        "comparisons.csv confusion_by_unit.csv confusion_by_unit.png "
         "confusion_random_window_leaky.csv confusion_random_window_leaky.png "
-        "detection_by_unit.png metrics.json models predictions.csv reliability.png "
+        "metrics.json models predictions.csv reliability.png "
         "report.html report.md scores.csv scores.png window_length.png"
     )
     metrics = metrics_of(trained)
@@ -68,6 +68,7 @@ def test_train_writes_what_it_promises(trained, by_unit):
     assert metrics["protocols_left_out"] == {"cross_specimen": reason}
     page = (trained / "report.html").read_text()
     assert "cross_specimen is left out: 1 specimen" in page
+    assert "needs 19 healthy or reference records of validation machines" in page
     methods = by_unit["methods"]
     judged = {"cnn", "label_shuffle", "indicators", "rms_threshold", "tooth_logistic"}
     probes = {
