@@ -1,6 +1,8 @@
 """Shared fixtures: the paper's rig as a configuration and as a machine."""
 
-from collections.abc import Callable, Mapping
+import os
+import shutil
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
@@ -124,3 +126,23 @@ def dynamics_of() -> Callable[..., PairDynamics]:
         )
 
     return make
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Headless Chromium; the tests that ask for it are skipped where there is none.
+
+    Needs the package ``playwright`` and ``GENSIG_CHROMIUM=/path/to/chromium``, or a Chromium on
+    the path, or the one that ``playwright install chromium`` fetches.
+    """
+    playwright = pytest.importorskip("playwright.sync_api", reason="package playwright")
+    on_path = filter(None, map(shutil.which, ("chromium", "google-chrome")))
+    path = os.environ.get("GENSIG_CHROMIUM") or next(on_path, None)
+    words = ["--no-sandbox", "--disable-gpu"]
+    with playwright.sync_playwright() as started:
+        try:
+            browser = started.chromium.launch(executable_path=path, args=words)
+        except playwright.Error as error:
+            pytest.skip(f"no Chromium: {str(error).splitlines()[0]}")
+        yield browser
+        browser.close()

@@ -14,6 +14,8 @@
     fault: { label: "fault frequency", color: "#D55E00", dash: "dashdot" },
   };
   const N_SIDEBANDS = 5, N_SHAFT_ORDERS = 10, N_FAULT_ORDERS = 12, ZOOM_TURNS = 12;
+  // Of every chart. The library's bar of tools has a button that sends the chart to a cloud service; no chart has the bar.
+  const CONFIG = { displayModeBar: false, showSendToCloud: false, plotlyServerURL: "", responsive: true, scrollZoom: false };
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
   const coarse = window.matchMedia("(pointer: coarse)");
 
@@ -40,7 +42,7 @@
     const node = document.getElementById("plot-" + name), ink = dark.matches ? "#e6edf3" : "#1b1f24", grid = dark.matches ? "#333b44" : "#e3e8ed";
     const axis = { gridcolor: grid, zerolinecolor: grid, linecolor: grid, automargin: true, exponentformat: "none" };
     const full = {
-      margin: { l: 60, r: 12, t: 32, b: 44 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+      margin: { l: 60, r: 12, t: 12, b: 44 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       font: { color: ink, size: 12 }, legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", x: 0 }, hovermode: "closest",
       dragmode: coarse.matches ? false : "zoom", ...layout,
       xaxis: { ...axis, ...layout.xaxis },
@@ -49,7 +51,7 @@
     if (full.yaxis.type === "log") full.yaxis.exponentformat = "power";
     if (layout.yaxis2) full.yaxis2 = { ...axis, ...layout.yaxis2 };
     node.setAttribute("aria-label", what);
-    Plotly.react(node, traces, full, { responsive: true, displaylogo: false, displayModeBar: coarse.matches ? false : "hover", scrollZoom: false });
+    Plotly.react(node, traces, full, CONFIG);
   }
 
   // ---- signals -------------------------------------------------------------------------------------------------

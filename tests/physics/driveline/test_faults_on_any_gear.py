@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from closeness import assert_close
-from line_words import IMPLICIT
+from line_tools import IMPLICIT
 from refusals import refused
 
 from gensig.driveline.teeth import felt_there, is_tabulated

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from closeness import assert_close
-from line_words import IMPLICIT
+from line_tools import IMPLICIT
 
 from gensig.driveline.line_gears import gear_dof
 from gensig.driveline.mesh_phase import start_phase

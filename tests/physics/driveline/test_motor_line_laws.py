@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from closeness import assert_close
-from line_words import IMPLICIT
+from line_tools import IMPLICIT
 
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.time.newmark import LineSolver, integrate_line

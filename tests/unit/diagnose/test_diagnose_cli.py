@@ -10,6 +10,7 @@ import fake_dataset
 import numpy as np
 import pytest
 from fake_dataset import FakeDataset
+from offline_pages import NOTHING, outward, sent_by
 from runs import (
     FAST,
     NETWORK_ONLY,
@@ -144,6 +145,11 @@ def test_the_page_stands_alone_and_says_what_matters(trained):
     assert len(sources) == 6
     assert all(source.startswith("data:image/png;base64,") for source in sources)
     assert "<script" not in page
+    assert outward(page) == []
+
+
+def test_the_page_fetches_nothing(browser, trained):
+    assert sent_by(browser, trained / "report.html") == NOTHING
 
 
 def test_names_from_a_file_stay_text_in_the_page(trained, tmp_path):

@@ -1,36 +1,20 @@
 """The page of a data set in headless Chromium: no errors, and each control does what it says.
 
-Needs the package ``playwright`` and a Chromium: ``GENSIG_CHROMIUM=/path/to/chromium``, or one on
-the path, or the one that ``playwright install chromium`` fetches; without them the test is skipped.
+It is skipped without a Chromium; the fixture ``browser`` says what it needs.
 """
 
-import os
-import shutil
+import re
 
 import numpy as np
 import pytest
 from dataset_samples import ATTRIBUTES, build, whole_conditions
+from offline_pages import NOTHING, sent_by
 
 from gensig.report.document import write_report
 
 HOSTILE = '<a href="https://example.org">x</a></script><img src=x onerror=alert(1)>'
 TRACES = "name => document.getElementById('plot-' + name).data.map(t => t.name)"
 AXIS = "name => document.getElementById('plot-' + name).layout.xaxis.title.text"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    playwright = pytest.importorskip("playwright.sync_api", reason="package playwright")
-    result = map(shutil.which, ("chromium", "google-chrome"))
-    path = os.environ.get("GENSIG_CHROMIUM") or next(filter(None, result), None)
-    words = ["--no-sandbox", "--disable-gpu"]
-    with playwright.sync_playwright() as started:
-        try:
-            browser = started.chromium.launch(executable_path=path, args=words)
-        except playwright.Error as error:
-            pytest.skip(f"no Chromium: {str(error).splitlines()[0]}")
-        yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")
@@ -94,8 +78,8 @@ def test_it_loads_and_fits(page):
     )  # no text became markup
 
 
-def test_legends_are_clear_of_the_toolbar(page):
-    """Below the drawing, whose upper edge leaves room for the toolbar."""
+def test_legends_are_clear_of_the_drawing(page):
+    """Below it."""
     box = (
         "([plot, part]) => document.querySelector(`#plot-${plot} "
         "${part}`).getBoundingClientRect().toJSON()"
@@ -105,7 +89,25 @@ def test_legends_are_clear_of_the_toolbar(page):
         for part in (".legend", ".nsewdrag", ".main-svg")
     )
     assert drawing["bottom"] <= legend["top"] <= legend["bottom"] <= whole["bottom"] + 1
-    assert drawing["top"] - whole["top"] >= 28  # height of the toolbar
+
+
+def test_it_fetches_nothing_and_has_no_button_that_sends(browser, page_file):
+    assert sent_by(browser, page_file) == NOTHING
+
+
+def test_a_button_that_sends_and_a_fetch_would_be_seen(browser, page_file, tmp_path):
+    """The page with the library's own choice of buttons, a picture from elsewhere and no policy."""
+    text = page_file.read_text(encoding="utf-8")
+    text = text.replace("displayModeBar: false", 'displayModeBar: "hover"')
+    text = text.replace("showSendToCloud: false", "showSendToCloud: true")
+    text = re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", text)
+    text = text.replace("</main>", '<img src="https://example.org/x.png"></main>')
+    changed = tmp_path / "page.html"
+    changed.write_text(text, encoding="utf-8")
+    seen = sent_by(browser, changed)
+    assert seen["asked"] == ["https://example.org/x.png"]
+    assert set(seen["ways_out"]) == {*seen["asked"], "https://plotly.com/"}
+    assert seen["buttons"] > 5
 
 
 def test_record_channel_and_comparison(page):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_rig import write_rig
+from offline_pages import NOTHING, outward, sent_by
 
 from diagnose.bridge.bridge_machine import bridge_machine
 from diagnose.bridge.bridge_networks import bridge_settings, network_answers
@@ -74,6 +75,14 @@ def test_the_page_says_what_physics_does_not_beat(page, result) -> None:
     assert "## Does physics beat it?" in text
     for method in METHODS:
         assert method in text
+
+
+def test_the_page_names_nothing_outside_of_it(page) -> None:
+    assert outward((page / PAGE).read_text()) == []
+
+
+def test_the_page_fetches_nothing(browser, page) -> None:
+    assert sent_by(browser, page / PAGE) == NOTHING
 
 
 def test_the_page_has_protocol_and_hashes(page, found) -> None:

@@ -8,6 +8,7 @@ import pytest
 from fake_dataset import FakeDataset
 from fake_lives import FakeLives
 from numpy.testing import assert_allclose, assert_array_equal
+from offline_pages import NOTHING, outward, sent_by
 from refusals import refused
 from runs import LIFE, metrics_of, refuses, rows_of, serve, settings_of, train
 
@@ -312,6 +313,10 @@ def test_censored_lives_are_counted_and_never_scored(life_study):
     assert np.max(ends) <= result["early_life_h"] * 1.00001
 
 
+def test_the_page_fetches_nothing(browser, life_study):
+    assert sent_by(browser, life_study / "report.html") == NOTHING
+
+
 def test_the_report_is_whole(life_study):
     tables = {"metrics.json", "predictions.csv", "scores.csv"}
     pages = {"report.html", "remaining_life_by_unit.png", "models"}
@@ -321,6 +326,7 @@ def test_the_report_is_whole(life_study):
     heads = ("How long the machines still run", "age only", "PHM score")
     for text in (*heads, "random_window_leaky is left out"):
         assert text in page
+    assert outward(page) == []
 
     methods = by_unit(life_study)["methods"]
     for row in rows_of(life_study / "scores.csv"):
