@@ -189,6 +189,62 @@ def test_hydra_is_imported_by_the_options_alone(graph) -> None:
     assert files == {"gensig/options"}
 
 
+# modules of the standard library that some systems do not have
+NOT_EVERYWHERE = {
+    "curses",
+    "fcntl",
+    "grp",
+    "posix",
+    "pty",
+    "pwd",
+    "readline",
+    "resource",
+    "syslog",
+    "termios",
+    "tty",
+}
+
+
+def imports_at_once(text: str) -> set[str]:
+    """Modules that a module imports when it is imported itself, so outside of its functions."""
+    result: set[str] = set()
+    waiting: list[ast.AST] = [ast.parse(text)]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.Import):
+            result |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            result.add((node.module or "").split(".")[0])
+        elif not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            waiting.extend(ast.iter_child_nodes(node))
+    return result
+
+
+def test_every_module_can_be_imported_on_every_system() -> None:
+    result = {
+        path.relative_to(ROOT).as_posix(): names
+        for path in python_files()
+        if (names := imports_at_once(path.read_text()) & NOT_EVERYWHERE)
+    }
+    assert result == {}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "import fcntl",
+        "from resource import getrlimit",
+        "import os, pwd",
+        "try:\n    import termios\nexcept ImportError:\n    pass",
+        "class A:\n    import grp",
+    ],
+)
+def test_an_import_of_some_systems_only_is_seen(text: str) -> None:
+    assert imports_at_once(text) & NOT_EVERYWHERE
+    late = "def f():\n    " + text.replace("\n", "\n    ")
+    assert not imports_at_once(late) & NOT_EVERYWHERE
+
+
 def test_no_import_runs_in_a_circle(graph) -> None:
     arrows = {
         module: graph.find_modules_directly_imported_by(module)

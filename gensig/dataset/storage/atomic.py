@@ -1,12 +1,11 @@
 """Files that are written whole or not at all, and text read with a limit of its size."""
 
 import errno
-import fcntl
 import hashlib
 import os
 import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from io import BufferedReader
 from pathlib import Path
 
@@ -14,6 +13,8 @@ from gensig.errors import DatasetError, WriteError
 from gensig.text.ordinary_file import is_refused, open_ordinary
 
 TEMPORARY_SUFFIX = ".tmp"
+TASK = "task"  # mark of a run that shares a folder, while it is at work
+LOCK_POLL_SECONDS = 0.01
 INSTEAD = "choose another out=DIR"  # remedy that helps whatever the disk says
 DATA_SET = "data set"
 # remedies where the disk refuses to write, by the number of the error
@@ -41,26 +42,18 @@ def locked(folder: Path) -> Iterator[None]:
 
     A lock ends with its process and leaves no file.
     """
-    try:
-        descriptor = os.open(folder, os.O_RDONLY)
-    except OSError as error:
-        raise DatasetError(
-            f"{folder} cannot be opened: {error.strerror}; give the folder of a data set"
-        ) from error
-    try:
-        # On a file system without locks, one writer at a time is the caller's duty.
-        with suppress(OSError):
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
+    with _opened(folder) as descriptor:
+        _lock(descriptor, waits=True)
         yield
-    finally:
-        os.close(descriptor)
 
 
 @contextmanager
 def at_work(folder: Path, *, others: bool) -> Iterator[None]:
     """Keep other local processes from making the files of the same folder.
 
-    A lock ends with its process and leaves no file. A folder that does not exist is not locked.
+    A run alone locks the folder, which leaves no file. Runs that share it lock a hidden file each,
+    which is removed at the end. Both locks end with their process, and a file without its lock
+    counts for nothing. A folder that does not exist is not locked.
 
     Parameters
     ----------
@@ -74,25 +67,66 @@ def at_work(folder: Path, *, others: bool) -> Iterator[None]:
     if not folder.is_dir():
         yield
         return
-    descriptor = os.open(folder, os.O_RDONLY)
-    kind = fcntl.LOCK_SH if others else fcntl.LOCK_EX
-    try:
-        _lock_at_once(descriptor, kind, folder)
+    with ExitStack() as held:
+        with locked(folder.parent):  # one at a time looks for others and begins
+            if others:
+                _begin_beside_others(folder, held)
+            else:
+                _begin_alone(folder, held)
         yield
+
+
+def _begin_alone(folder: Path, held: ExitStack) -> None:
+    _lock_at_once(held.enter_context(_opened(folder)), folder)
+    for mark in folder.glob(f".{TASK}.*{TEMPORARY_SUFFIX}"):
+        # another run's mark may go at any time; a link or a pipe is none
+        with suppress(OSError), open_ordinary(mark) as file:
+            _lock_at_once(file.fileno(), folder)
+
+
+def _begin_beside_others(folder: Path, held: ExitStack) -> None:
+    with _opened(folder) as descriptor:
+        _lock_at_once(descriptor, folder)
+    mark = temporary_name(folder / TASK)
+    file = mark.open("xb")
+    held.callback(mark.unlink, missing_ok=True)
+    _lock_at_once(held.enter_context(file).fileno(), folder)
+
+
+@contextmanager
+def _opened(folder: Path) -> Iterator[int]:
+    """Descriptor of a folder."""
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise DatasetError(
+            f"{folder} cannot be opened: {error.strerror}; give the folder of a data set"
+        ) from error
+    try:
+        yield descriptor
     finally:
         os.close(descriptor)
 
 
-def _lock_at_once(descriptor: int, kind: int, folder: Path) -> None:
-    try:
-        fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
-    except BlockingIOError as error:
+def _lock_at_once(descriptor: int, folder: Path) -> None:
+    """Lock a descriptor until it is closed; raise DatasetError where another process has it."""
+    if not _lock(descriptor, waits=False):
         raise DatasetError(
             f"another process is at work in {folder.parent}; wait until it ends, or stop it"
-        ) from error
+        )
+
+
+def _lock(descriptor: int, *, waits: bool) -> bool:
+    """False where another process has the lock, which is not waited for."""
+    from filelock import lock_descriptor  # takes 40 ms, and readers lock nothing
+
+    try:
+        return lock_descriptor(
+            descriptor, blocking=waits, poll_interval=LOCK_POLL_SECONDS
+        )
     except OSError:
-        # On a file system without locks, one run at a time is the caller's duty.
-        return
+        # On a file system without locks, one writer at a time is the caller's duty.
+        return True
 
 
 def sync_folder(folder: Path) -> None:

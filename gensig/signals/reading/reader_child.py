@@ -9,7 +9,6 @@ import ctypes
 import importlib
 import json
 import os
-import resource
 import signal
 import sys
 from typing import IO, Any
@@ -66,9 +65,16 @@ def _die_with(parent: int) -> None:
 
 
 def _limit(memory_bytes: int, cpu_seconds: int) -> None:
-    """Bound memory and time; refuse files to write, further processes and core dumps."""
+    """Bound memory and time; refuse files to write, further processes and core dumps.
+
+    A system without such limits has none; the parent ends the process when its time is over.
+    """
     sys.dont_write_bytecode = True
-    address_space = _address_space() + memory_bytes
+    try:
+        import resource
+    except ImportError:
+        return
+    address_space = _address_space(resource.getpagesize()) + memory_bytes
     limits = {
         resource.RLIMIT_AS: address_space,
         resource.RLIMIT_CPU: cpu_seconds,
@@ -87,11 +93,11 @@ def _limit(memory_bytes: int, cpu_seconds: int) -> None:
         resource.setrlimit(limit, (value, hard))
 
 
-def _address_space() -> int:
+def _address_space(page_bytes: int) -> int:
     """Bytes of the address space that are used now; 0 where the system does not tell."""
     try:
         with open(STATM, encoding="ascii") as file:
-            return int(file.read().split()[0]) * resource.getpagesize()
+            return int(file.read().split()[0]) * page_bytes
     except OSError:
         return 0
 

@@ -1,5 +1,11 @@
 """One run at a time makes the shards of a folder; tasks of an array job share it."""
 
+import errno
+import multiprocessing
+import os
+import signal
+
+import filelock
 import pytest
 from small_sets import TINY, contents, make
 
@@ -35,6 +41,47 @@ def test_a_second_run_is_refused_and_the_set_is_whole_after_the_first(
     assert main(["resume", "--quiet", "-j", "1", str(frozen)]) == 0
     assert verify(frozen).problems == []
     assert contents(frozen) == contents(make(tmp_path / "plain"))
+
+
+def work_until_killed(shards, others, begun):
+    with at_work(shards, others=others):
+        begun.set()
+        signal.pause()
+
+
+@pytest.mark.parametrize("others", [True, False])
+def test_the_lock_of_a_killed_run_counts_for_nothing(frozen, capsys, others):
+    shards = frozen / SHARDS
+    context = multiprocessing.get_context("spawn")
+    begun = context.Event()
+    run = context.Process(target=work_until_killed, args=(shards, others, begun))
+    run.start()
+    assert begun.wait(60)
+    assert len(list(shards.iterdir())) == int(others)
+    refused(capsys, frozen, "resume", "--quiet", "-j", "1", str(frozen))
+
+    os.kill(run.pid, signal.SIGKILL)
+    run.join()
+    assert main(["resume", "--quiet", "-j", "1", str(frozen)]) == 0
+    assert verify(frozen).problems == []
+    assert not [path for path in shards.iterdir() if path.name.startswith(".")]
+
+
+@pytest.mark.parametrize("others", [True, False])
+def test_a_run_that_ends_leaves_no_file(frozen, others):
+    with at_work(frozen / SHARDS, others=others):
+        pass
+    assert list((frozen / SHARDS).iterdir()) == []
+
+
+def test_a_system_without_locks_locks_nothing(frozen, monkeypatch):
+    def refuse(_descriptor, **_):
+        raise OSError(errno.ENOSYS, "no locks")
+
+    monkeypatch.setattr(filelock, "lock_descriptor", refuse)
+    with at_work(frozen / SHARDS, others=False), at_work(frozen / SHARDS, others=True):
+        assert main(["resume", "--quiet", "-j", "1", str(frozen)]) == 0
+    assert verify(frozen).problems == []
 
 
 def test_tasks_share_a_folder_that_nobody_closes_meanwhile(frozen, capsys):
