@@ -37,7 +37,7 @@ docs: $(VENV)/.installed-docs
 	@echo "Open build/site/index.html; with the search: $(BIN)/python -m http.server --directory build/site"
 
 $(VENV)/.installed: pyproject.toml constraints.txt | $(VENV)/bin/python
-	$(BIN)/python -m pip install --quiet $(PIP_ARGS) --constraint constraints.txt --editable ".[diagnose]"
+	$(BIN)/python -m pip install --quiet $(PIP_ARGS) --constraint constraints.txt --editable ".[diagnose,parquet]"
 	@touch $@
 
 $(VENV)/.installed-test: pyproject.toml constraints.txt | $(VENV)/bin/python

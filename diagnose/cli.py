@@ -15,6 +15,7 @@ from gensig.errors import ConfigError
 from gensig.terminal.printing import show, show_text, tell_text
 from gensig.terminal.program import HELP_FLAGS, Parser, exit_text, guarded, refuse_verb
 from gensig.text.escaping import set_warning_lines
+from gensig.text.installation import install
 from gensig.version import __version__
 
 # Verb -> its purpose. ``diagnose.commands.VERB`` has HELP, EXAMPLE, ``add_arguments(parser)`` and
@@ -53,7 +54,6 @@ EXTRA = {
     "sklearn": "scikit-learn",
     "safetensors": "safetensors",
 }
-INSTALL = "pip install 'gensig[diagnose]'"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -106,7 +106,9 @@ def _require_packages() -> None:
     """Raise ConfigError where a package of the extra is missing, before any work begins."""
     missing = [name for module, name in EXTRA.items() if not _is_installed(module)]
     if missing:
-        raise ConfigError(f"{PROGRAM} needs {', '.join(missing)}: {INSTALL}")
+        raise ConfigError(
+            f"{PROGRAM} needs {', '.join(missing)}: {install('diagnose')}"
+        )
 
 
 def _is_installed(module: str) -> bool:

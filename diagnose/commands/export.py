@@ -27,7 +27,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--to",
         required=True,
         choices=["onnx"],
-        help="format; needs pip install 'gensig[onnx]'",
+        help="format; needs the packages of the extra onnx",
     )
     add_model(parser)
     parser.add_argument(

@@ -20,6 +20,7 @@ from diagnose.data.windows import normalised
 from diagnose.recordings.raw_windows import RawWindows, raw_examples, with_fixed_pooling
 from diagnose.recordings.stored_network import StoredNetwork
 from gensig.errors import ConfigError, GensigError
+from gensig.text.installation import install
 from gensig.version import __version__
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def need_packages() -> None:
         import onnxscript  # noqa: F401
     except ImportError as error:
         raise ConfigError(
-            f"export --to onnx needs the package {error.name}: pip install 'gensig[onnx]'",
+            f"export --to onnx needs the package {error.name}: {install('onnx')}",
         ) from None
 
 

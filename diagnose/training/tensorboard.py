@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gensig.errors import ConfigError
+from gensig.text.installation import install
 
 if TYPE_CHECKING:
     from diagnose.training.train import OnEpoch
@@ -22,8 +23,8 @@ def need_tensorboard() -> None:
         import torch.utils.tensorboard  # noqa: F401
     except ImportError:
         raise ConfigError(
-            "tensorboard=true needs the package tensorboard: "
-            "pip install 'gensig[tensorboard]', or leave it false"
+            f"tensorboard=true needs the package tensorboard: {install('tensorboard')}; or "
+            "leave it false"
         ) from None
 
 

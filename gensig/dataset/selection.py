@@ -13,6 +13,7 @@ import numpy as np
 from gensig.dataset.plan import Plan
 from gensig.dataset.schema import PARAMS
 from gensig.errors import DatasetError
+from gensig.text.installation import install
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -169,7 +170,7 @@ class Selection:
             import pandas
         except ImportError as error:
             raise DatasetError(
-                "to_pandas needs the package pandas; pip install 'gensig[pandas]'"
+                f"to_pandas needs the package pandas: {install('pandas')}"
             ) from error
         columns = {
             name: self.column(name) for name in names or self.dataset.column_names

@@ -13,6 +13,7 @@ from typing import Any
 
 from gensig.errors import ConfigError
 from gensig.execution.base import TRIES, Executor, ShardFailure, T, guarded, one_line
+from gensig.text.installation import install
 
 CONNECT_SECONDS = 20
 
@@ -110,7 +111,7 @@ def load_distributed() -> ModuleType:
         import distributed
     except ImportError as error:
         raise ConfigError(
-            "executor=dask needs the package distributed, which is an extra; pip install "
-            "'gensig[dask]'"
+            "executor=dask needs the package distributed, which is an extra: "
+            f"{install('dask')}"
         ) from error
     return distributed

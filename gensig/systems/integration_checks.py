@@ -116,10 +116,9 @@ def not_finite(run: Run[MachineT], meshes: Sequence[PairDynamics]) -> StepError:
             )
     if solver.max_error is not None:
         remedy = (
-            "raise operating.torque_nm, or make the errors of the gears (quality, fault) "
-            "smaller"
+            "bring operating.torque_nm nearer to gear.rated_torque_nm, or make the errors of the "
+            "gears (quality, fault) smaller"
         )
     return StepError(
-        f"{failed}: teeth that part land harder than such steps can follow, the more so the "
-        f"lighter the load; {remedy}"
+        f"{failed}: teeth lose contact, and these steps are too long for their impacts; {remedy}"
     )

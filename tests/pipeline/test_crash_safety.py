@@ -22,6 +22,7 @@ from gensig.dataset.folder import beginning
 from gensig.dataset.folder.layout import read_manifest, shard_path
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.storage.receipts import receipt_path, write_receipt
+from gensig.text.installation import install
 
 
 @pytest.fixture(scope="module")
@@ -276,7 +277,7 @@ def test_resume_without_the_compression_is_refused_before_anything_runs(
     capsys.readouterr()
     assert resume(out) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "gensig[blosc2]" in line
+    assert install("blosc2") in line
     assert not any((out / "shards").iterdir())
 
 

@@ -4,6 +4,7 @@ import functools
 import itertools
 import operator
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -23,6 +24,7 @@ from gensig.execution.base import TRIES, ShardFailure
 from gensig.execution.dask import DaskExecutor
 from gensig.execution.local import LocalExecutor
 from gensig.execution.registry import read_executor
+from gensig.text.installation import install
 
 LOCAL = LocalExecutor(n_workers=2)
 
@@ -174,7 +176,7 @@ def test_a_mistake_is_one_line(section, hint):
 
 def test_missing_dask_is_one_line(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(ConfigError, match=r"gensig\[dask\]"):
+    with pytest.raises(ConfigError, match=re.escape(install("dask"))):
         read_executor({"kind": "dask", "n_workers": 1, "address": None})
 
 

@@ -74,6 +74,16 @@ def test_the_two_commands_are_those_of_the_makefile():
     assert all(f"\n{target}:" in makefile for target in targets)
 
 
+def test_its_installation_brings_what_its_commands_need():
+    """`diagnose`, and the package of the formats that the line on exports names."""
+    (formats,) = re.findall(r"gensig export .*# or (.*)", TEXT)
+    assert {"hf", "parquet"} <= set(re.findall(r"\w+", formats))
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    (of_demo,) = re.findall(r"/\.installed: .*\n.* \"\.\[(.*)\]\"\n", makefile)
+    (of_readme,) = re.findall(r"Without `make`: `pip install '\.\[(.*)\]'`", TEXT)
+    assert of_demo == of_readme == "diagnose,parquet"
+
+
 @pytest.mark.parametrize(
     "page", ["README.md", "docs/index.md", "docs/alternatives.md", "docs/tour.ipynb"]
 )

@@ -44,6 +44,7 @@ from gensig.dataset.storage.attributes import HDF5_ERRORS, set_attribute
 from gensig.dataset.storage.image import LIBRARY_VERSIONS
 from gensig.errors import DatasetError
 from gensig.text.csv_tables import write_rows
+from gensig.text.installation import install
 
 TEXT_BYTES = 1024  # of a text column that the schema does not know
 HUGGING_FACE = "hf"
@@ -231,7 +232,7 @@ def _check_pyarrow(to: str) -> None:
         import pyarrow  # noqa: F401
     except ImportError as error:
         raise DatasetError(
-            f"format {to} needs the package pyarrow; pip install 'gensig[parquet]'"
+            f"format {to} needs the package pyarrow: {install('parquet')}"
         ) from error
 
 

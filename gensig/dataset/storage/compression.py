@@ -9,6 +9,7 @@ from typing import Any
 import h5py
 
 from gensig.errors import DatasetError
+from gensig.text.installation import install
 
 COMPRESSIONS = ("none", "gzip", "lzf", "blosc2")
 
@@ -51,7 +52,7 @@ def load_blosc2(what: str) -> ModuleType:
         import hdf5plugin
     except ImportError as error:
         raise DatasetError(
-            f"{what} needs the package hdf5plugin, which is an extra; pip install 'gensig[blosc2]'"
+            f"{what} needs the package hdf5plugin, which is an extra: {install('blosc2')}"
         ) from error
     return hdf5plugin
 

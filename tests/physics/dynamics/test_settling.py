@@ -20,6 +20,7 @@ from gensig.errors import SimulationError, StepError
 from gensig.faults.broken import MissingTooth
 from gensig.sensing.manufacturing import draw_gearbox, draw_specimen
 from gensig.systems.base import simulate_together
+from gensig.systems.integration_checks import not_finite
 from gensig.systems.run import Run
 
 RATE = 51200.0
@@ -197,10 +198,12 @@ class TestLandingsTooHardForTheSettling:
         """With a limit of the error; without one the error says what to raise."""
         (failed,) = simulate_together([landing(9)])
         assert isinstance(failed, StepError)
-        told = (
-            "land harder than such steps can follow.*raise solver.oversampling above 9"
-        )
+        told = "too long for their impacts; raise solver.oversampling above 9"
         assert re.search(told, str(failed))
+
+        remedy = str(not_finite(landing(9, max_error=1.0), []))
+        assert "operating.torque_nm nearer to gear.rated_torque_nm" in remedy
+        assert not re.search("(raise|lower) operating.torque_nm", remedy)
 
         (record,) = simulate_together([landing(9, max_error=1.0)])
         (finer,) = simulate_together([landing(18, max_error=1.0)])

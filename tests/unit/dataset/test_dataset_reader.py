@@ -1,6 +1,7 @@
 """Reading of data sets in plan order, from several processes, finished or not."""
 
 import pickle
+import re
 import sys
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.testing import assert_array_equal
 import gensig.dataset.shard_files as shard_files
 from gensig.dataset.reader import open_dataset
 from gensig.errors import DatasetError
+from gensig.text.installation import install
 
 
 def test_facts(data):
@@ -110,7 +112,7 @@ def test_a_data_frame_has_the_columns_and_the_numbers_of_the_records(data):
 
 def test_without_pandas_it_says_what_to_install(data, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(DatasetError, match=r"pip install 'gensig\[pandas\]'"):
+    with pytest.raises(DatasetError, match=re.escape(install("pandas"))):
         data.to_pandas()
 
 

@@ -28,6 +28,7 @@ import gensig.dataset.reader
 from benchmarks._damaged_models import forge
 from diagnose.cli import main
 from diagnose.report.page import result_table, write_report
+from gensig.text.installation import install
 
 
 def fake(**changes):
@@ -357,6 +358,6 @@ def test_without_its_packages_it_says_what_to_install(missing, tmp_path):
         done = run(*words)
         assert done.returncode == 2
         name = missing.replace("sklearn", "scikit-learn")
-        expected = f"diagnose: diagnose needs {name}: pip install 'gensig[diagnose]'\n"
+        expected = f"diagnose: diagnose needs {name}: {install('diagnose')}\n"
         assert done.stderr == expected
     assert run("--help").returncode == run("train", "--help").returncode == 0

@@ -9,6 +9,8 @@ import pytest
 from fake_dataset import FakeDataset
 from small_studies import train
 
+from gensig.text.installation import install
+
 accumulator = pytest.importorskip(
     "tensorboard.backend.event_processing.event_accumulator", reason="extra tensorboard"
 )
@@ -83,6 +85,6 @@ def test_without_the_package_one_line_says_what_to_install():
     shown = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False
     )
-    message = "needs the package tensorboard: pip install 'gensig[tensorboard]'"
+    message = f"needs the package tensorboard: {install('tensorboard')}"
     assert f"tensorboard=true {message}" in shown.stdout
     assert shown.returncode == 0

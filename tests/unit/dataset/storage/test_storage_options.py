@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import re
 import shutil
 import sys
 
@@ -32,6 +33,7 @@ from gensig.dataset.storage.compression import COMPRESSIONS, compression_of
 from gensig.dataset.storage.guard import open_shard
 from gensig.dataset.storage.quantization import quantized, read_signal
 from gensig.errors import DatasetError
+from gensig.text.installation import install
 
 HALF_COUNT = 0.5 * (1 + 1e-9)
 FAILED = 12
@@ -267,7 +269,7 @@ def test_reader_refuses_a_scale_that_is_none(whole, tmp_path):
 
 def test_missing_plugin_is_one_line(whole, tmp_path, plan, monkeypatch):
     monkeypatch.setitem(sys.modules, "hdf5plugin", None)
-    needed = r"blosc2.* needs the package hdf5plugin.*'gensig\[blosc2\]'"
+    needed = "blosc2.* needs the package hdf5plugin.*" + re.escape(install("blosc2"))
     for use in (
         lambda: write_shard(tmp_path / "a.h5", plan, compression="blosc2"),
         lambda: open_shard(shard_path(whole, 0)),

@@ -14,6 +14,7 @@ from diagnose.data.windows import Segments, load_windows
 from diagnose.recordings import onnx_export
 from diagnose.training.classes import predict_windows
 from diagnose.training.store import load_model
+from gensig.text.installation import install
 
 onnx = pytest.importorskip("onnx", reason="extra onnx")
 onnxruntime = pytest.importorskip("onnxruntime", reason="extra onnx")
@@ -139,5 +140,5 @@ def test_without_the_extra_one_line_says_what_to_install(
     model, tmp_path, capsys, monkeypatch
 ):
     monkeypatch.setitem(sys.modules, "onnxscript", None)
-    message = "needs the package onnxscript: pip install 'gensig[onnx]'"
+    message = f"needs the package onnxscript: {install('onnx')}"
     refuses(capsys, exporting(model, tmp_path / "m.onnx"), message)
