@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import re
 
 import numpy as np
 import pytest
@@ -65,6 +66,17 @@ def test_no_fault_is_not_there_and_not_seen(control, tmp_path):
     assert (maps.auroc == 0.5).all()
     detectability_figure(tmp_path / "nothing.svg", maps)
     assert "Physically there" in (tmp_path / "nothing.svg").read_text()
+
+
+def test_the_figure_names_the_best_test(crack, tmp_path):
+    detectability_figure(tmp_path / "maps.svg", crack)
+    text = (tmp_path / "maps.svg").read_text()
+    tests = set()
+    for values in (crack.known, crack.seen):
+        *_, band = np.unravel_index(np.nanargmax(values), values.shape)
+        tests.add(f"best: pinion_y, up to {BANDS[band] / 1e3:.3g} kHz")
+        assert np.nanmin(values[..., band]) > np.nanmin(values)  # the worst is another
+    assert set(re.findall(r"best: pinion_y, up to \S+ kHz", text)) == tests
 
 
 def test_half_the_noise_doubles_the_distance(single):

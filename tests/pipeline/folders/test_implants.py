@@ -89,8 +89,12 @@ def test_the_set_is_whole_and_opens(made):
         refuse_carried(blocks, recording, name="day0.npz")
 
 
-def test_the_same_command_gives_the_same_bytes(made):
-    assert main(command(made, "again")) == 0
+def test_the_same_command_gives_the_same_bytes(made, capsys):
+    loud = [word for word in command(made, "again") if word != "--quiet"]
+    assert main(loud) == 0
+    said = capsys.readouterr()
+    assert "2 healthy recording(s) at 1" in said.err
+    assert "held out, for scores: " in said.out
     assert contents(made / "again") == contents(made / "set")
     assert main(command(made, "other", "--seed", "1")) == 0
     assert contents(made / "other") != contents(made / "set")

@@ -18,6 +18,7 @@ from diagnose.data.lives import (
     early_level,
     lives_of,
 )
+from diagnose.report import life_report
 from diagnose.scoring.judged import interval_text
 from diagnose.scoring.life_scores import (
     MEASURES,
@@ -31,7 +32,7 @@ from diagnose.scoring.life_scores import (
 )
 from diagnose.scoring.machines import Machines
 from diagnose.studies import life_jobs
-from diagnose.studies.life_jobs import run_life_job
+from diagnose.studies.life_jobs import LifePrediction, run_life_job
 from diagnose.studies.life_study import plan_life_study
 from diagnose.studies.study import task_from
 from gensig.errors import ConfigError, DatasetError
@@ -155,6 +156,31 @@ def test_intervals_hold_for_new_lives_where_pooled_ones_do_not():
 
 
 # ---- lives
+
+
+def test_a_figure_of_lives_ends_at_the_failure_on_the_right(monkeypatch):
+    lives, level = lives_of(settled(FakeLives(n_lives=4))[0]), 150.0
+    prediction = LifePrediction(
+        protocol="by_unit",
+        method="network",
+        seed=0,
+        record=np.arange(lives.age.size),
+        predicted=np.minimum(lives.remaining, level),
+        half_width=10.0,
+        early_life=level,
+        detail="",
+    )
+    figures = []
+    monkeypatch.setattr(
+        life_report, "save", lambda figure, path: figures.append(figure)
+    )
+    life_report.life_figure("lives.png", lives, [prediction])
+    (panel,) = figures[0].axes
+    early, late = panel.get_xlim()
+    low, high = panel.get_ylim()
+    assert late <= 0 < level <= early
+    assert low <= 0 < level <= high
+    assert early - late < 1.2 * level
 
 
 def test_a_bound_above_the_early_level_is_known_and_one_below_is_not():

@@ -1,8 +1,14 @@
 """Recordings whose turns are not where speed and teeth put them get a line and no class."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from refusals import refused
 from runs import model_of, refuses, says
+
+from diagnose.recordings.channels import tacho_apart
+from gensig.signals.recording import RecordingFile
 
 RATE = 12800
 TEETH = (23, 84)
@@ -63,6 +69,29 @@ def test_a_speed_that_nothing_tells_must_be_given(ask, capsys):
     message = "give --speed-rpm and --teeth 23 84, or --tacho CHANNEL"
     refuses(capsys, ask(gearing()), message)
     refuses(capsys, ask(gearing(), "--teeth", *TEETH), message)
+
+
+def test_the_channel_of_a_tacho_is_none_of_the_sensors():
+    names, values = ("x", "pulses", "y"), np.arange(12.0).reshape(3, 4)
+    content = RecordingFile(
+        file="day.npz",
+        channels=names,
+        named=True,
+        values=values,
+        sampling_rate=1.0,
+        has_level=True,
+    )
+    for index, name in enumerate(names):
+        others = [other for other in range(3) if other != index]
+        left, tacho = tacho_apart(content, name)
+        assert left.channels == tuple(names[other] for other in others)
+        assert (left.values == values[others]).all()
+        assert (tacho == values[index]).all()
+    alone = replace(content, channels=("pulses",), values=values[:1])
+    with refused("no channel beside pulses"):
+        tacho_apart(alone, "pulses")
+    with refused("no channel tacho; it has x, pulses, y"):
+        tacho_apart(content, "tacho")
 
 
 def test_a_recording_without_a_mesh_is_refused(ask, capsys):
