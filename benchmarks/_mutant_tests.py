@@ -41,8 +41,11 @@ LEFT_OUT = (
     "tests/pipeline/test_tour.py",
 )
 COMMANDS = "tests/pipeline"
-# folder of tests of a package that has none below tests/unit
-FOLDERS = {"gensig/production": COMMANDS}
+# begin of a package -> folder of its tests, which are not below tests/unit
+FOLDERS = {
+    "gensig/production": COMMANDS,
+    "gensig/commands": f"{COMMANDS}/commands",
+}
 MOST_FILES = 20  # of tests for one mutant, the nearest first
 FARTHEST = 3  # imports between a test and the mutated module, if a test is that near
 MOST_IMPORTS = 7  # such as from a command to the module that draws its picture
@@ -225,12 +228,15 @@ def nearest_tests(root: Path, name: str, function: str = "") -> list[str]:
     }
     if "commands" in Path(name).parts:
         function = Path(name).stem  # a test of a command has the verb, not its function
-    farthest = max(FARTHEST, min(distances.values(), default=FARTHEST))
+    # a command is reached through the program of all commands, some of whose tests skip a step
+    step = int(folder.startswith(COMMANDS))
+    farthest = max(FARTHEST, min(distances.values(), default=FARTHEST) + step)
     for test, distance in distances.items():
         likeness = _likeness(test, name)
         if distance > min(farthest, MOST_IMPORTS) and likeness < ALIKE:
             continue
-        is_late = test.startswith(COMMANDS) and folder != COMMANDS and distance > 1
+        is_late = test.startswith(COMMANDS) and distance > 1
+        is_late = is_late and not folder.startswith(COMMANDS)
         nearness = likeness + 1.0 / distance
         nearness += 1.0 * _mentions(root / test, function)
         nearness += 0.5 * Path(test).is_relative_to(package)
@@ -248,8 +254,11 @@ def _likeness(test: str, name: str) -> float:
 
 def _folder_of_tests(name: str) -> str:
     """Folder of the tests of a module."""
-    package = Path(name).parent.as_posix()
-    return FOLDERS.get(package, f"tests/unit/{package.removeprefix('gensig/')}")
+    package = Path(name).parent
+    for begin, folder in FOLDERS.items():
+        if package.is_relative_to(begin):
+            return folder
+    return f"tests/unit/{package.as_posix().removeprefix('gensig/')}"
 
 
 def _mentions(path: Path, function: str) -> bool:
@@ -279,9 +288,11 @@ def _imports_of_tests(root: Path) -> dict[str, frozenset[str]]:
     result = {}
     for path in sorted(folder.rglob("test_*.py")):
         imported = reached(path, {path})
-        conftest = path.parent / "conftest.py"
-        if conftest.exists():
-            imported |= reached(conftest, {path})
+        # the one of all tests says nothing about the subject of a test
+        of_folders = [each for each in path.parents if each.is_relative_to(folder)][:-1]
+        for conftest in (each / "conftest.py" for each in of_folders):
+            if conftest.exists():
+                imported |= reached(conftest, {path})
         result[path.relative_to(root).as_posix()] = frozenset(imported)
     return result
 

@@ -44,14 +44,22 @@ def written(tmp_path, monkeypatch):
     return content
 
 
+class Panels(dict):
+    """The panels of a figure by their titles, and the title of them all, as they are saved."""
+
+    def __init__(self, figure):
+        super().__init__({panel.get_title(): panel for panel in figure.axes})
+        self.title = figure.get_suptitle()
+
+
 @pytest.fixture
 def drawn(monkeypatch):
-    """The panels of each figure by their titles; figures are not rendered."""
+    """The panels of each figure; figures are not rendered."""
     figures = []
 
     def keep(figure, path, **_):
         path.write_text("drawn")
-        figures.append({panel.get_title(): panel for panel in figure.axes})
+        figures.append(Panels(figure))
 
     monkeypatch.setattr(Figure, "savefig", keep)
     return figures

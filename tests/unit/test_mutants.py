@@ -325,7 +325,9 @@ class TestVerdicts:
     ("module", "test"),
     [
         ("gensig/signals/reading/reader_child.py", "signals/test_hostile_recordings"),
-        ("gensig/commands/figures/wear_figure.py", "commands/test_"),
+        ("gensig/commands/figures/wear_figure.py", "commands/test_wear_command"),
+        ("gensig/commands/sets/running.py", "commands/test_set_commands"),
+        ("gensig/commands/gears/modify.py", "commands/test_gear_commands"),
         ("diagnose/commands/predict.py", "recordings/test_healthy_recordings"),
     ],
 )

@@ -1,5 +1,7 @@
 """A record depends only on its row; noise depends on the healthy twin and not on the motion."""
 
+import pickle
+
 import numpy as np
 import pytest
 from closeness import assert_close
@@ -67,6 +69,18 @@ def test_records_are_independent_in_any_order_and_block(config, rows, in_order, 
         records.forget_twins()
     assert bits(in_order[5]) != bits(in_order[4])
     assert_same(simulated(config, [rows[5]]), [in_order[5]])
+
+
+@pytest.mark.parametrize("word", ["seed=1", "quality.iso1328_grade=9", "gear=fzg_c_16_24"])
+def test_what_was_read_before_leaves_the_teeth_of_another_set(config, rows, word):
+    """One process reads several sets: one by one, and those of a sweep."""
+
+    def teeth(given):
+        return pickle.dumps(InputReader(given).inputs(rows[0]).run.specimen)
+
+    first, other = teeth(config), teeth(read_request([*WORDS, word]).config)
+    assert other != first
+    assert teeth(config) == first
 
 
 def test_a_failure_leaves_its_block(config, rows, in_order):

@@ -1,12 +1,16 @@
 """Run-ups by ``gensig simulate``: figure, table of orders, refusals."""
 
 import json
+import re
 
 import h5py
 import numpy as np
 import pytest
 
 from gensig.cli import main
+from gensig.commands.figures.run_up_figure import plot_run_up
+from gensig.commands.gears.run_up import Mode, RunUp
+from gensig.signals.run_up.level_map import LevelMap
 
 RAMP = (
     "simulate operating=ramp operating.duration_s=1 sensing.channels=[pinion_y,wheel_y]"
@@ -60,6 +64,40 @@ def test_the_orders_of_an_engine_peak_where_they_meet_a_natural_frequency(
     highest = table["speed_rpm"][table["order_4_rad_per_s"].argmax()]
     assert 4.0 * highest / 60.0 == pytest.approx(second, rel=0.05)
     assert next(iter(drawn[0].values())).get_xlabel() == "order of the crank"
+
+
+@pytest.mark.parametrize("n_modes", [1, 11, 12, 40])
+def test_every_natural_frequency_is_listed_or_counted(drawn, tmp_path, n_modes):
+    modes = [
+        Mode(name=f"f{index}", frequency=10.0 * index, damping_ratio=0.02)
+        for index in range(1, n_modes + 1)
+    ]
+    levels = LevelMap(
+        time=np.arange(3.0),
+        speed=np.array([10.0, 20.0, 30.0]),
+        axis=np.arange(5.0),
+        rms=np.ones((3, 5)),
+        total=np.ones(3),
+        resolution=1.0,
+    )
+    run_up = RunUp(
+        channel="pinion_y",
+        shaft="pinion",
+        orders=levels,
+        waterfall=levels,
+        cuts={"turn": 1.0},
+        modes=tuple(modes),
+    )
+    plot_run_up(run_up, tmp_path / "r.png", name="a run-up")
+    figure = next(iter(drawn[0].values())).figure
+    texts = [text.get_text() for panel in figure.axes for text in panel.texts]
+    (key,) = [text for text in texts if text.startswith("natural frequencies, Hz")]
+    listed = [mode.name for mode in modes if f"\n{mode.name}  " in key]
+    left = re.search(r"\nand (\d+) more to (\d+)$", key)
+    assert listed == [mode.name for mode in modes[: len(listed)]]
+    assert len(listed) + int(left[1] if left else 0) == n_modes
+    assert not left or float(left[2]) == modes[-1].frequency
+    assert drawn[0].title == "a run-up: pinion_y, pinion from 95 to 286 r/min"
 
 
 def test_too_short_a_run_up_is_drawn_as_a_constant_speed_and_told(gensig, drawn):

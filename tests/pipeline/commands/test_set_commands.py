@@ -33,6 +33,10 @@ def test_simulate_writes_one_record(gensig, drawn, suffix, tmp_path, capsys):
     assert wave.get_xlabel() == "time, s"
     assert wave.get_ylabel() == "acceleration, m/s$^2$"
     assert spectrum.get_title().endswith("harmonics of the mesh frequency 690.0 Hz")
+    first, last = spectrum.get_xlim()
+    assert first == 0
+    assert 0.3 * 51.2 < last < 0.5 * 51.2  # kHz, below half the sampling rate
+    assert re.fullmatch(r"missing_tooth, .*: 1800.0 r/min, 20 N m", drawn[0].title)
     assert (
         len(envelope.lines) == 13
     )  # with and without the fault, eleven turns of the pinion

@@ -38,6 +38,7 @@ class TestTurns:
         [
             ("operating.turns_of=pinion", 10 / 30),
             ("operating.turns_of=wheel", OF_THE_WHEEL),
+            ("fault=healthy", 10 / 30),  # no gear is faulted
             ("fault=crack", 10 / 30),
             ("fault=crack fault.gear=wheel", OF_THE_WHEEL),
             ("plan.classes=[healthy,crack]", 10 / 30),

@@ -93,6 +93,23 @@ def test_a_folder_that_was_there_stays_and_is_empty(tmp_path):
     assert list(out.iterdir()) == []
 
 
+def test_a_folder_that_another_process_makes_meanwhile_stays(tmp_path, monkeypatch):
+    folder, mkdir = tmp_path / "sets" / "mine", Path.mkdir
+
+    def overtaken(path):
+        mkdir(path)
+        if path.name == "sets":
+            raise FileExistsError(path)
+
+    monkeypatch.setattr(Path, "mkdir", overtaken)
+    with pytest.raises(RuntimeError), made_together.made_together() as made:
+        made.folder(folder)
+        assert folder.is_dir()
+        raise RuntimeError
+    assert not folder.exists()
+    assert folder.parent.is_dir()
+
+
 def test_a_disk_that_is_read_only_keeps_its_remedy(tmp_path):
     """It refuses removal too, so that what was begun stays, and is begun anew."""
     for out, line in refusals(tmp_path, errno.EROFS, removal=True):
