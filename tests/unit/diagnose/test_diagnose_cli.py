@@ -24,6 +24,7 @@ from runs import (
 )
 from sklearn.metrics import balanced_accuracy_score
 
+import diagnose.commands.verify
 import gensig.dataset.reader
 from benchmarks._damaged_models import forge
 from diagnose.cli import main
@@ -338,6 +339,17 @@ def test_diagnose_loads_neither_numba_nor_the_physics():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (done.stdout.strip(), done.stderr) == ("[]", "")
+
+
+@pytest.mark.parametrize(("left_with", "status"), [(None, 0), (0, 0), (3, 3)])
+def test_a_verb_that_leaves_with_a_status_is_the_command_s(
+    left_with, status, monkeypatch
+):
+    def leave(_):
+        sys.exit(left_with)
+
+    monkeypatch.setattr(diagnose.commands.verify, "run", leave)
+    assert main(["verify", "anything"]) == status
 
 
 @pytest.mark.parametrize("missing", ["torch", "sklearn", "safetensors"])

@@ -1,6 +1,7 @@
 """Measured responses: what they do to a signal, and every file that is refused."""
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 from refusals import refused
 from scipy.signal import fftconvolve, sosfilt
@@ -62,6 +63,19 @@ def test_impulse_response_is_a_convolution(tmp_path):
     expected = fftconvolve(source, taps, axes=1).sum(axis=0)[:500]
 
     assert_allclose(result, [expected], atol=1e-9)
+
+
+@pytest.mark.parametrize("channels", [CHANNELS, CHANNELS[::-1]])
+@pytest.mark.parametrize("sensors", [("housing", "lid"), ("lid", "housing")])
+def test_every_pair_has_its_own_response(tmp_path_factory, channels, sensors):
+    """Whatever order they were read in before."""
+    names = ["pinion_y_to_housing", "wheel_y_to_housing"]
+    names += ["pinion_y_to_lid", "wheel_y_to_lid"]
+    file = tmp_path_factory.getbasetemp() / "pairs.csv"
+    path = MeasuredPath(file=impulse_file(file, np.eye(4, 64), names=names))
+    taps = read_responses(path, channels, sensors, RATE).taps
+    for (row, column), first in np.ndenumerate(taps.argmax(axis=-1)):
+        assert names[first] == f"{channels[column]}_to_{sensors[row]}"
 
 
 def test_frequency_response_of_a_mode_rings_as_the_mode_does(tmp_path):

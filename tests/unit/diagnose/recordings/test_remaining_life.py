@@ -12,6 +12,7 @@ from offline_pages import NOTHING, outward, sent_by
 from refusals import refused
 from runs import LIFE, metrics_of, refuses, rows_of, serve, settings_of, train
 
+from diagnose.baselines import life_models
 from diagnose.data.lives import (
     balanced_weights,
     choose_life_protocols,
@@ -156,6 +157,21 @@ def test_intervals_hold_for_new_lives_where_pooled_ones_do_not():
 
 
 # ---- lives
+
+
+@pytest.mark.parametrize(("curve", "is_line"), [(np.abs, False), (np.negative, True)])
+def test_a_curve_that_no_line_follows_is_learnt_by_boosting(curve, is_line):
+    lives = lives_of(settled(FakeLives(n_lives=40, n_snapshots=10))[0])
+    x = np.random.default_rng(0).uniform(-1.0, 1.0, lives.age.size)
+    target, record = 100.0 * curve(x), np.arange(x.size)
+    train, validation = (
+        life_models.Table(values=x[part][:, None], record=part)
+        for part in (record[::2], record[1::2])
+    )
+    name, predict = life_models.fit_regression(train, validation, lives, target)
+    assert (name != life_models.BOOSTING) == is_line
+    error = predict(validation) - target[validation.record]
+    assert np.sqrt(np.mean(error**2)) < 0.05 * np.ptp(target)
 
 
 def test_a_figure_of_lives_ends_at_the_failure_on_the_right(monkeypatch):
