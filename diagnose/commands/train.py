@@ -207,9 +207,10 @@ def _started(
     left_out: Mapping[str, str],
 ) -> AbstractContextManager[Callable[[str], None]]:
     """Progress of a study, whose folder now exists and whose missing protocols are named."""
+    from diagnose.data.protocols import left_out_lines
     from diagnose.progress import progress
 
-    for name, reason in left_out.items():
-        tell(f"protocol {name} is left out: {reason}")
+    for line in left_out_lines(left_out):
+        tell(line)
     out.mkdir(parents=True, exist_ok=True)
     return progress(n_jobs)

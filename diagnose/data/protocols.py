@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,14 +19,15 @@ if TYPE_CHECKING:
 # over classes.
 HEALTHY_ONLY = "healthy_only"
 OPEN_PROTOCOLS = (HEALTHY_ONLY, "open_set")
-# What these say, `NEW_MACHINE` says where no two units share gears or a gearbox.
+# They repeat `NEW_MACHINE` in a set in which no two machines share gears or a gearbox.
 BY_PART = ("by_unit", "cross_specimen", "cross_gearbox")
-SAID_ALREADY = (
-    f"says what {NEW_MACHINE} says where every unit has gears and a gearbox of its own"
+NOTHING_SHARED = (
+    "the set has no machines that share gears or a gearbox, "
+    f"so {NEW_MACHINE} tests the same"
 )
 MEANING = {
     NEW_MACHINE: "on machines never seen, neither their gears nor their gearbox",
-    "by_unit": "tested on machines (unit = one set of gears in one gearbox) never seen in training",
+    "by_unit": "on machines never seen; their gears or their gearbox may be known",
     "cross_specimen": "on sets of gears never seen",
     "cross_gearbox": "on gearboxes never seen; their sets of gears may be known",
     "cross_speed": "on machines never seen, at speeds above all of training",
@@ -35,9 +36,9 @@ MEANING = {
     "cross_snr": "on machines never seen, in more noise than all of training",
     "unseen_severity_inner": "on machines never seen, "
     "with severities in a gap in the middle of those of training; "
-    "healthy records and faults of one severity as in by_unit",
+    "healthy records and faults of one severity everywhere",
     "unseen_severity_outer": "on machines never seen, with severities above all of training; "
-    "healthy records and faults of one severity as in by_unit",
+    "healthy records and faults of one severity everywhere",
 }
 
 
@@ -50,7 +51,7 @@ def choose_protocols(
     ----------
     task : of an open data set
     wanted : names, or None for every protocol that the set has, with `OPEN_PROTOCOLS` and
-        `CROSS_SENSOR`; beside `NEW_MACHINE` those `BY_PART` are left out where they say the same
+        `CROSS_SENSOR`; beside `NEW_MACHINE` those `BY_PART` are left out where they repeat it
 
     Raises
     ------
@@ -70,8 +71,8 @@ def choose_protocols(
             left_out[name] = reason
     absent = {name: left_out[name] for name in wanted if name in left_out}
     if NEW_MACHINE in wanted and NEW_MACHINE not in absent and _has_own_parts(task):
-        said = [name for name in wanted if name in BY_PART and name not in absent]
-        absent |= dict.fromkeys(said, SAID_ALREADY)
+        repeated = [name for name in wanted if name in BY_PART and name not in absent]
+        absent |= dict.fromkeys(repeated, NOTHING_SHARED)
     chosen = tuple(name for name in wanted if name not in absent)
     if not chosen:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in absent.items())
@@ -82,8 +83,22 @@ def choose_protocols(
     return chosen, absent
 
 
+def left_out_lines(left_out: Mapping[str, str]) -> list[str]:
+    """Lines on protocols that are left out, one a reason, in the order of the mapping."""
+    names: dict[str, list[str]] = {}
+    for name, reason in left_out.items():
+        names.setdefault(reason, []).append(name)
+    return [f"{_are_left_out(same)}: {reason}" for reason, same in names.items()]
+
+
+def _are_left_out(names: Sequence[str]) -> str:
+    if len(names) == 1:
+        return f"protocol {names[0]} is left out"
+    return f"protocols {', '.join(names)} are left out"
+
+
 def _has_own_parts(task: Task) -> bool:
-    """True where every unit has gears and a gearbox that no other unit has."""
+    """True where every machine has gears and a gearbox that no other machine has."""
     columns = [np.asarray(task.dataset.column(name)) for name in MACHINE_COLUMNS]
     machines = np.unique(np.stack(columns), axis=1).shape[1]
     return all(len(np.unique(names)) == machines for names in columns)
@@ -143,5 +158,5 @@ def _why_no_window(task: Task, name: str) -> str | None:
 
 def _why_no_cross_sensor(task: Task) -> str | None:
     if "by_unit" not in task.dataset.protocols:
-        return "it needs the protocol by_unit"
+        return "the set has no protocol by_unit, whose machines it takes"
     return task.cross_channels if isinstance(task.cross_channels, str) else None

@@ -151,8 +151,7 @@ def _sentence(metrics: Content, protocol: str, detection: Content) -> str:
     """Network, protocol and false alarms behind the lines."""
     name = protocol
     if protocol in MEANING:
-        meaning = MEANING[protocol].removeprefix("tested ")
-        name = f"{protocol} (tested {meaning})"
+        name = f"{protocol} (tested {MEANING[protocol]})"
     text = f"Network {metrics['model']}, protocol {name}."
     if detection["missing"]:
         return text

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from diagnose.data.lives import Lives
-from diagnose.data.protocols import MEANING
+from diagnose.data.protocols import MEANING, left_out_lines
 from diagnose.report.markdown import table_lines
 from diagnose.report.panels import COLORS, panels, save, spaced
 from diagnose.report.text import (
@@ -108,8 +108,8 @@ def write_life_report(
         )
     sections.append(Section(title="What the numbers mean", notes=[*MEANINGS.items()]))
     left_out = [
-        ("", f"{name} is left out: {reason}.")
-        for name, reason in metrics["protocols_left_out"].items()
+        ("", f"{line[0].upper()}{line[1:]}.")
+        for line in left_out_lines(metrics["protocols_left_out"])
     ]
     if left_out:
         sections.append(Section(title="Protocols left out", notes=left_out))

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from diagnose.data.protocols import left_out_lines
 from diagnose.report.methods import controls_on_cards, rivals_on_cards
 from diagnose.report.novelty_report import novelty_caveats
 from diagnose.scoring.judged import drawn_text, interval_text, too_few_text
@@ -305,8 +306,8 @@ def caveats(metrics: Content) -> list[str]:
             "The network sees windows without their level, the indicators with it unless stated; "
             "normalise=none gives the level to the network too."
         )
-    for name, reason in metrics["protocols_left_out"].items():
-        lines.append(f"{name} is left out: {reason}.")
+    for line in left_out_lines(metrics["protocols_left_out"]):
+        lines.append(f"{line[0].upper()}{line[1:]}.")
     for name, reason in metrics["baselines_left_out"].items():
         lines.append(f"The baseline {name} is left out of {reason}.")
     if n_failed := metrics["n_records_unusable"]:

@@ -295,15 +295,18 @@ SET_VERBS = {
     ),
     "reproduce": Verb(
         summary="simulate records of a data set again and compare",
-        examples=("gensig reproduce runs/quickstart --records 20",),
+        examples=(
+            "gensig reproduce runs/quickstart --records 20",
+            "gensig reproduce runs/quickstart --records r000016,r000020",
+        ),
         runs="gensig.commands.sets.checks:reproduce",
         arguments=(
             FOLDER,
-            count(
+            text(
                 "--records",
-                "N",
-                "records, spread evenly (default: 10)",
-                default=10,
+                "N|ID,ID",
+                "a number of records, spread evenly, or the ids of some (default: 10)",
+                default="10",
             ),
         ),
         status_1="records came out otherwise than recorded",
@@ -339,7 +342,7 @@ SET_VERBS = {
         summary="a data set as one HDF5 file, Parquet, npz, wav or for Hugging Face, with splits",
         examples=(
             "gensig export runs/quickstart --to parquet --out quickstart.parquet",
-            "gensig export runs/quickstart --to hf --protocol by_unit --out quickstart_hf",
+            "gensig export runs/quickstart --to hf --protocol new_machine --out quickstart_hf",
         ),
         runs="gensig.commands.sets.export:export",
         arguments=(
@@ -350,7 +353,7 @@ SET_VERBS = {
                 "--protocol",
                 "NAME",
                 "split to export, may be repeated; 'all': every one that keeps units apart "
-                "(default: all, hf: the first of new_machine, by_unit, ...); "
+                "(default: all, hf: new_machine, in a crossed set by_unit); "
                 "random_window_leaky only by its name",
                 action="append",
             ),

@@ -1,23 +1,31 @@
-"""Notes on a plan: units without records, and splits by machine that are not possible."""
+"""Notes on a plan: machines without records, many records of few, splits that are not possible."""
 
 from __future__ import annotations
 
+from gensig.dataset.distributions import GRID
 from gensig.dataset.plan import Plan
 from gensig.dataset.splitting.protocols import why_left_out
 from gensig.life.life_options import runs_to_failure
 from gensig.options.configuration import Configuration
 
 BY_MACHINE = {
-    "by_unit": "unit",
+    "by_unit": "machine",
     "cross_specimen": "set of gears",
     "cross_gearbox": "gearbox",
 }
+# Records of a machine above which more machines are worth more than more records: twice those of
+# the experiments with most. `experiment=quickstart` has 4 (docs/howto/unknown_machine.md).
+MOST_OF_A_MACHINE, ADVISED_OF_A_MACHINE = 40, 4
 
 
 def plan_notes(config: Configuration, plan: Plan) -> list[str]:
-    """At most one line: units without records, and splits by machine that are not possible."""
+    """At most one line: machines without records or with many, and splits that are not possible."""
     examples = plan.examples()
-    parts = (_units_left_out(config, examples), _splits_left_out(examples, config.seed))
+    parts = (
+        _units_left_out(config, examples),
+        _few_machines(config, examples),
+        _splits_left_out(examples, config.seed),
+    )
     note = "; ".join(filter(None, parts))
     return [note] * bool(note)
 
@@ -31,11 +39,26 @@ def _units_left_out(config: Configuration, plan: Plan) -> str:
     repeats = _count(config["plan"]["n_repeats"], "repeat")
     records = _count(plan.n_records, "record")
     counts = f"{records} are {conditions} of {classes} and {repeats}"
-    return f"{counts}: {used} of {asked} units are used"
+    return f"{counts}: {used} of {asked} machines are used"
+
+
+def _few_machines(config: Configuration, plan: Plan) -> str:
+    """Note on many records of few machines, where the number of machines is free."""
+    options, machines = config["plan"], n_different(plan, "unit_id")
+    given = options["conditions_per_unit"] is not None or options["design"] == GRID
+    each = plan.n_records / machines
+    if given or each <= MOST_OF_A_MACHINE or runs_to_failure(config):
+        return ""
+    counts = f"{_count(plan.n_records, 'record')} of {_count(machines, 'machine')}"
+    more = plan.n_records // ADVISED_OF_A_MACHINE
+    return (
+        f"{counts}: {each:.0f} each; a model for machines never seen gains more from more "
+        f"machines: plan.n_units={more} has {ADVISED_OF_A_MACHINE} each"
+    )
 
 
 def _splits_left_out(plan: Plan, seed: int) -> str:
-    """Reasons why splits by machine are not possible; only that of units if there is one."""
+    """Reasons why splits by machine are not possible; only that of machines if there is one."""
     reasons = why_left_out(plan, seed, tuple(BY_MACHINE))
     if "by_unit" in reasons:
         reasons = {"by_unit": reasons["by_unit"]}

@@ -248,8 +248,6 @@ def loading(data: Dataset) -> list[Section]:
     name = [*faulty, *data.class_names][0]
     units = ", ".join(dict.fromkeys(channel_units(data)))
     protocols = data.protocols
-    if "by_unit" in protocols:
-        protocols = ["by_unit"]
     code = [
         "import gensig",
         "",

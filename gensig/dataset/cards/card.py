@@ -23,7 +23,7 @@ import gensig
 with gensig.open_dataset("PATH/TO/THIS/FOLDER") as data:
     labels = data.column("label")                    # (record,) index into data.class_names
     signal = data.signals(0)                         # (channel, sample) float32, m/s^2
-    parts = data.split("by_unit" if "by_unit" in data.protocols else data.protocols[0])
+    parts = data.split(data.protocols[0])            # the hardest protocol comes first
 ```
 Without gensig: every shard is plain HDF5, see `docs/format.md` of gensig. \
 Hugging Face `datasets` takes the folder

@@ -12,6 +12,12 @@ TRAIN, VALIDATION, TEST = range(len(SUBSETS))
 VALIDATION_SHARE = 0.2
 MIN_TESTED = 10  # groups: an interval over fewer is too narrow
 MAX_FOR_TESTS = 0.25  # of the groups, so that training keeps more than half
+# One group of a column in words, and several.
+GROUP_NAMES = {
+    "unit_id": ("machine", "machines"),
+    "specimen_id": ("set of gears", "sets of gears"),
+    "gearbox_id": ("gearbox", "gearboxes"),
+}
 _ATTEMPTS = 200
 
 
@@ -57,7 +63,10 @@ def deal_groups(plan: Plan, deal: Deal, rng: np.random.Generator) -> SplitTable 
         groups = plan.columns[deal.column]
     names, group = np.unique(groups, return_inverse=True)
     if len(names) < deal.min_groups:
-        return f"{len(names)} {deal.column} in the plan, and at least {deal.min_groups} are needed"
+        return (
+            f"the plan has {_counted(len(names), deal.column)}, and at least {deal.min_groups} "
+            "are needed"
+        )
     classes, label = np.unique(plan.columns["label"], return_inverse=True)
     holds = np.zeros((len(SUBSETS), len(names), len(classes)), dtype=bool)
     for subset, usable in enumerate(deal.usable):
@@ -81,7 +90,13 @@ def deal_groups(plan: Plan, deal: Deal, rng: np.random.Generator) -> SplitTable 
         present = np.stack([held[side == k].any(axis=0) for k, held in sides])
         if (present >= needed).all():
             return _table(plan, side[group], deal.usable)
-    return f"no deal of {len(names)} {deal.column} found that gives every subset all its classes"
+    dealt = _counted(len(names), deal.column)
+    return f"no deal of {dealt} found that gives every subset all its classes"
+
+
+def _counted(n: int, column: str) -> str:
+    """A number of groups in words, such as '1 set of gears'."""
+    return f"{n} {GROUP_NAMES.get(column, (column, column))[n != 1]}"
 
 
 def _best_tested(

@@ -201,7 +201,7 @@ def test_why_is_precise():
         "cross_speed": "speed_set_rpm is 1800 in all records",
         "cross_torque": "the plan has no column torque_nm",
         "cross_snr": "snr_db is not a number in 100 of 100 records",
-        "cross_gearbox": "1 gearbox_id in the plan, and at least 3 are needed",
+        "cross_gearbox": "the plan has 1 gearbox, and at least 3 are needed",
         "unseen_severity_inner": "no class has enough different severities",
         "open_set": "three classes",
     }

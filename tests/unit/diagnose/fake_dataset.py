@@ -46,7 +46,7 @@ class FakeDataset:
         self.signal_names = ["acceleration", "healthy_twin"][: 1 + twins]
         self.gear_names = ["pinion", "wheel"]
         self.protocols = ("by_unit", "random_window_leaky")
-        few = "1 specimen_id in the plan, and at least 4 are needed"
+        few = "the plan has 1 set of gears, and at least 4 are needed"
         self.left_out = {"cross_specimen": few, "new_machine": few}
         self.usable = np.ones(n, dtype=bool)
         self.sham, self.strength, self.noise, self.seed = sham, strength, noise, seed
@@ -103,7 +103,7 @@ class FakeDataset:
         return signal[channels if channels is not None else slice(None), start:stop]
 
     def split(self, protocol):
-        if protocol != "by_unit":
+        if protocol not in ("new_machine", "by_unit"):
             fractions = {
                 "train": (0, 0.5),
                 "validation": (0.5, 0.75),

@@ -67,10 +67,10 @@ def test_train_writes_what_it_promises(trained, by_unit):
     )
     metrics = metrics_of(trained)
     assert list(metrics["protocols"]) == ["by_unit", "random_window_leaky"]
-    reason = "1 specimen_id in the plan, and at least 4 are needed"
+    reason = "the plan has 1 set of gears, and at least 4 are needed"
     assert metrics["protocols_left_out"] == {"cross_specimen": reason}
     page = (trained / "report.html").read_text()
-    assert "cross_specimen is left out: 1 specimen" in page
+    assert "cross_specimen is left out: the plan has 1 set of gears" in page
     assert "needs 19 healthy or reference records of validation machines" in page
     methods = by_unit["methods"]
     judged = {"cnn", "label_shuffle", "indicators", "rms_threshold", "tooth_logistic"}
@@ -272,7 +272,7 @@ TRAIN = "train data=good out=OUT"
     [
         ("train data=good", "out is required"),
         (f"{TRAIN} protocols=[by_unitt]", "'by_unitt'; did you mean by_unit"),
-        (f"{TRAIN} protocols=[cross_specimen]", "1 specimen_id in the plan"),
+        (f"{TRAIN} protocols=[cross_specimen]", "the plan has 1 set of gears"),
         (f"{TRAIN} protocols=[cross_sensor]", "has 1 channel, and 2 are needed"),
         (f"{TRAIN} epoch=3", "epochs"),
         (f"{TRAIN} model=cnnn", "cnn"),

@@ -28,6 +28,7 @@ def test_a_model_of_the_user_learns_and_is_judged_on_unseen_units(monkeypatch, c
     """With five classes, of which the page knows nothing."""
     shape = {"n_units": 16, "records_per_unit": 8, "duration": 0.5}
     data = FakeDataset(**shape, noise=0.2, classes=(*CLASSES, "wear"))
+    data.protocols = ("new_machine",)
     monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path, **_: data)
     names = run_page("train_your_model.md")
     shown = capsys.readouterr().out

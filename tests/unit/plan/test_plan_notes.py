@@ -25,8 +25,8 @@ def test_units_without_a_record_are_told():
         "plan.n_repeats=2",
     )
     assert line == (
-        "12 records are 2 conditions of 3 classes and 2 repeats: 2 of 4 units are used; no "
-        "split by unit is possible (2 unit_id in the plan, and at least 3 are needed)"
+        "12 records are 2 conditions of 3 classes and 2 repeats: 2 of 4 machines are "
+        "used; no split by machine is possible (the plan has 2 machines, and at least 3 are needed)"
     )
 
 
@@ -34,8 +34,17 @@ def test_a_split_by_machine_that_cannot_be_made_is_told():
     (line,) = said(FOUR, "plan.n_records=80", "plan.n_units=8", "plan.n_gearboxes=2")
     assert (
         line
-        == "no split by gearbox is possible (2 gearbox_id in the plan, and at least 3 are needed)"
+        == "no split by gearbox is possible (the plan has 2 gearboxes, and at least 3 are needed)"
     )
+
+
+def test_many_records_of_few_machines_are_told():
+    (line,) = said("experiment=quickstart", "plan.n_records=820", "plan.n_units=20")
+    assert line == (
+        "820 records of 20 machines: 41 each; a model for machines never seen gains more from "
+        "more machines: plan.n_units=205 has 4 each"
+    )
+    assert said("experiment=quickstart", "plan.n_records=800", "plan.n_units=20") == []
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ def names(tmp_path, monkeypatch):
     build(tmp_path / "runs" / "quick", every_protocol_plan(), references=True)
     for _, words in command_lines(PAGE):
         if "hf" in words:
-            words = [*words, "--protocol", "by_unit"]
+            words = [*words, "--protocol", "new_machine"]
         assert main(words[1:]) == 0
     result = {}
     for block in blocks(PAGE):
@@ -35,7 +35,7 @@ def names(tmp_path, monkeypatch):
 
 def test_page_loads_the_same_training_from_every_format(names):
     with open_dataset("runs/quick") as data:
-        dealt = sorted(record for record, _, _ in data.split("by_unit")["train"])
+        dealt = sorted(record for record, _, _ in data.split("new_machine")["train"])
         ids = data.column("record_id")[dealt].tolist()
         signals = np.stack([data.signals(record) for record in dealt])
         classes = data.class_names

@@ -1,11 +1,17 @@
-"""Protocols of a study: where every unit is a machine of its own, ``new_machine`` says it all."""
+"""Protocols of a study: where no two machines share a part, ``new_machine`` stands for all."""
 
 import numpy as np
 import pytest
 from fake_dataset import FakeDataset
 from small_studies import settings_of
 
-from diagnose.data.protocols import BY_PART, MEANING, SAID_ALREADY, choose_protocols
+from diagnose.data.protocols import (
+    BY_PART,
+    MEANING,
+    NOTHING_SHARED,
+    choose_protocols,
+    left_out_lines,
+)
 from diagnose.studies.study import task_from
 from gensig.dataset.splitting.protocols import PROTOCOLS
 
@@ -30,7 +36,7 @@ def test_splits_by_part_are_left_out_where_they_say_the_same():
     assert chosen[0] == "new_machine"
     assert set(OTHERS) <= set(chosen)
     assert {name: left_out[name] for name in BY_PART} == dict.fromkeys(
-        BY_PART, SAID_ALREADY
+        BY_PART, NOTHING_SHARED
     )
 
 
@@ -61,3 +67,16 @@ def test_every_clean_protocol_of_a_classifier_has_a_meaning():
     assert set(PROTOCOLS) - open_ones <= set(MEANING)
     assert next(iter(MEANING)) == "new_machine"
     assert np.all([text.strip() == text for text in MEANING.values()])
+
+
+def test_one_line_tells_all_that_are_left_out_for_one_reason():
+    left_out = choose_protocols(task_of(), None)[1]
+    (line,) = left_out_lines(left_out)
+    assert line == (
+        "protocols by_unit, cross_specimen, cross_gearbox are left out: the set has no machines "
+        "that share gears or a gearbox, so new_machine tests the same"
+    )
+    assert left_out_lines({"a": "it is full", "b": "it is empty"}) == [
+        "protocol a is left out: it is full",
+        "protocol b is left out: it is empty",
+    ]
