@@ -271,6 +271,11 @@ def settings_from(config: Configuration) -> TrainSettings:
         raise ConfigError(f"diagnose train knows no key '{unknown[0]}'")
     values = config.plain()
     values["model"] = config.section("model")
+    if isinstance(seed := values["seeds"], int) and not isinstance(seed, bool):
+        raise ConfigError(
+            f"seeds={seed} is one number, and seeds is a list: 'seeds=[{seed}]' trains once, with "
+            f"seed {seed}; 'seeds=[0,1,2]' trains three times"
+        )
     for name in LISTS:
         values[name] = _as_tuple(name, values[name])
     if values["seeds"] is None:

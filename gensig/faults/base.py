@@ -41,6 +41,8 @@ class Fault(ABC):
     kind: ClassVar[str]
     # law by which the fault grows over a life
     growth: ClassVar[Growth]
+    # groups of keys in files; a fault with 0 in all keys of a group leaves every tooth healthy
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = ()
     # True if the fault does the same to each of its teeth
     alike: ClassVar[bool] = True
     # True for a fault of the mounting of two gears: other meshes of its gear are free of it
@@ -111,6 +113,30 @@ def require(fault: Fault, key: str, holds: bool, rule: str) -> None:
     value = getattr(fault, split_unit(key)[0])
     shown = f"{from_si(key, value):g}" if isinstance(value, float) else repr(value)
     raise FaultError(f"fault.{key} = {shown} {rule}")
+
+
+def zero_size(fault: Fault) -> tuple[str, ...]:
+    """The first group of ``Fault.sizes`` that is 0 in all its keys; empty for a real fault."""
+    for group in fault.sizes:
+        if all(getattr(fault, split_unit(key)[0]) == 0.0 for key in group):
+            return group
+    return ()
+
+
+def require_size(faults: Iterable[Fault]) -> None:
+    """Raise a FaultError for a fault that leaves every tooth healthy, as its label would be wrong.
+
+    Raises
+    ------
+    FaultError    names the keys that are 0
+    """
+    for fault in faults:
+        if keys := zero_size(fault):
+            given = " and ".join(f"fault.{key} = 0" for key in keys)
+            raise FaultError(
+                f"{given}: a tooth of that size is healthy, and the record would be labelled "
+                f"{fault.kind}; give a size other than 0, or fault=healthy"
+            )
 
 
 def require_not_negative(fault: Fault, *keys: str) -> None:

@@ -31,6 +31,7 @@ class MissingTooth(Fault):
 
     kind: ClassVar[str] = "missing_tooth"
     growth: ClassVar[Growth] = Growth.NONE
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = ()
 
     def severity(self, gear: Gear) -> float:
         """Always 1."""
@@ -55,6 +56,7 @@ class BrokenTooth(Fault):
 
     kind: ClassVar[str] = "broken"
     growth: ClassVar[Growth] = Growth.NONE
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (("broken_height_mm",),)
     broken_height: float = unit("mm")
     broken_edge_height: float = unit("um", default=0.0)
     broken_edge_width: float = unit("mm", default=0.0)
@@ -90,6 +92,10 @@ class ChippedTooth(Fault):
 
     kind: ClassVar[str] = "chipped"
     growth: ClassVar[Growth] = Growth.NONE
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("chip_height_mm",),
+        ("chip_width_mm",),
+    )
     chip_height: float = unit("mm")
     chip_width: float = unit("mm")
     chip_shape: str = "triangular"

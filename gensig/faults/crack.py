@@ -43,6 +43,10 @@ class Crack(Fault):
 
     kind: ClassVar[str] = "crack"
     growth: ClassVar[Growth] = Growth.PARIS
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("crack_depth_mm",),
+        ("crack_width_mm",),
+    )
     crack_depth: float = unit("mm")
     crack_angle: float = unit("deg")
     crack_start: str

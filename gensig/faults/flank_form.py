@@ -58,6 +58,7 @@ class PitchError(FlankForm):
 
     kind: ClassVar[str] = "pitch_error"
     growth: ClassVar[Growth] = Growth.NONE
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (("pitch_error_um",),)
     pitch_error: float = unit("um")
 
     def size(self) -> float:
@@ -80,6 +81,9 @@ class ProfileError(FlankForm):
 
     kind: ClassVar[str] = "profile_error"
     growth: ClassVar[Growth] = Growth.NONE
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("profile_slope_um", "profile_form_um"),
+    )
     profile_slope: float = unit("um")
     profile_form: float = unit("um")
     profile_waves: float
@@ -110,6 +114,7 @@ class Runout(FlankForm):
 
     kind: ClassVar[str] = "runout"
     growth: ClassVar[Growth] = Growth.NONE
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (("eccentricity_um",),)
     alike: ClassVar[bool] = False
     eccentricity: float = unit("um")
 
@@ -149,6 +154,7 @@ class Misalignment(FlankForm):
 
     kind: ClassVar[str] = "misalignment"
     growth: ClassVar[Growth] = Growth.NONE
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (("misalignment_um",),)
     of_mounting: ClassVar[bool] = True
     misalignment: float = unit("um")
 
@@ -178,6 +184,7 @@ class Wear(FlankForm):
 
     kind: ClassVar[str] = "wear"
     growth: ClassVar[Growth] = Growth.ARCHARD
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (("wear_depth_um",),)
     wear_depth: float = unit("um")
     wear_profile: tuple[float, ...] | None = None
 
@@ -212,6 +219,10 @@ class TipRelief(FlankForm):
 
     kind: ClassVar[str] = "tip_relief"
     growth: ClassVar[Growth] = Growth.NONE
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("relief_um",),
+        ("relief_length_mm",),
+    )
     relief: float = unit("um")
     relief_length: float = unit("mm")
     relief_curve: str = "linear"

@@ -78,6 +78,11 @@ class Pitting(Hole):
 
     kind: ClassVar[str] = "pitting"
     growth: ClassVar[Growth] = Growth.NONE
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("pit_length_mm",),
+        ("pit_width_mm",),
+        ("pit_depth_mm", "pit_edge_height_um"),
+    )
     prefix: ClassVar[str] = "pit"
     pit_length: float = unit("mm")
     pit_width: float = unit("mm")
@@ -110,6 +115,11 @@ class Spalling(Hole):
 
     kind: ClassVar[str] = "spalling"
     growth: ClassVar[Growth] = Growth.NONE
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("spall_length_mm",),
+        ("spall_width_mm",),
+        ("spall_depth_mm", "spall_edge_height_um"),
+    )
     prefix: ClassVar[str] = "spall"
     spall_length: float = unit("mm")
     spall_width: float = unit("mm")
@@ -173,6 +183,7 @@ class DistributedPitting(Fault):
 
     kind: ClassVar[str] = "distributed_pitting"
     growth: ClassVar[Growth] = Growth.PITS
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (("pitted_share",),)
     alike: ClassVar[bool] = False
     pitted_share: float
     pit_diameter: float = unit("mm")

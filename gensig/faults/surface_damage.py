@@ -59,6 +59,7 @@ class SurfaceDamage(Fault):
 
     kind: ClassVar[str] = "surface_damage"
     growth: ClassVar[Growth] = Growth.NONE
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (("damage",),)
     alike: ClassVar[bool] = False
     damage: float
     spalled_share: float

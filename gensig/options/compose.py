@@ -43,6 +43,7 @@ from gensig.options.several_values import (
     list_text,
     several_values_text,
 )
+from gensig.options.whole_numbers import with_whole_numbers
 from gensig.text import nearest
 
 # names under which faults of rolling bearings are looked for
@@ -73,10 +74,15 @@ def compose(
     ------
     ConfigError    for an unknown key or option, a value of the wrong form, or a missing folder
     """
-    words = tuple(overrides)
+    words = in_digits(overrides)
     if config_dir is None:
         return _packaged(config_name, words)
     return _composed(config_name, words, config_dir)
+
+
+def in_digits(overrides: Sequence[str]) -> tuple[str, ...]:
+    """Overrides in which a count such as ``plan.n_records=1e3`` is typed as 1000."""
+    return with_whole_numbers(overrides, lambda key: _default(key, overrides)[1])
 
 
 @functools.lru_cache(maxsize=256)

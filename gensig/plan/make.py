@@ -17,7 +17,7 @@ from gensig.dataset.distributions import LATIN_HYPERCUBE, Distribution
 from gensig.dataset.plan import Plan, record_ids, shard_rows
 from gensig.dataset.schema import SCALES, signal_column
 from gensig.errors import ConfigError
-from gensig.faults.base import faulty_teeth
+from gensig.faults.base import faulty_teeth, require_size
 from gensig.faults.registry import fault_parts, read_faults
 from gensig.life.life_options import runs_to_failure
 from gensig.life.options import read_wear_options
@@ -137,6 +137,8 @@ def make_plan(config: Configuration) -> Plan:
                 start = stream(seed, Stream.TWIN, condition)
             ids = _ids(options, label, unit, gearbox, specimen, condition, repeat)
             fault = faults[names[label]][condition]
+            if not options.sham:
+                require_size(read_faults(fault))
             drawn_columns = _row(machine, fault, values, start, sham=options.sham)
             rows.append(ids | drawn_columns | _gear_columns(options, machine))
     if options.n_reference:

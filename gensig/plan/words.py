@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gensig.options.compose import override_keys, typed_mapping
+from gensig.options.compose import in_digits, override_keys, typed_mapping
 
 VARY_KEYS = ("plan.vary", "fault.vary")
 
@@ -43,6 +43,7 @@ def typed_words(overrides: Sequence[str]) -> Words:
     ------
     ConfigError    for a word that cannot be read, and for several values of a key
     """
+    overrides = in_digits(overrides)
     keys = override_keys(overrides)
     plan_vary, fault_vary = (typed_mapping(overrides, key) for key in VARY_KEYS)
     plain = [

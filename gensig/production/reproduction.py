@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -55,8 +55,10 @@ class Reproduction:
     other: dict[str, tuple[str, str]]
 
 
-def reproduce(folder: Path, n_records: int) -> Reproduction:
-    """Simulate records spread over a data set and compare their samples with those on disk.
+def reproduce(folder: Path, records: int | Sequence[str]) -> Reproduction:
+    """Simulate records of a data set and compare their samples with those on disk.
+
+    ``records`` are so many, spread over the set, or those of some ids or numbers.
 
     In the environment that made the data set every bit must agree. On another processor, or with
     other versions of the libraries, a difference of ``ACCEPTED`` of the record's RMS is accepted,
@@ -65,8 +67,10 @@ def reproduce(folder: Path, n_records: int) -> Reproduction:
     Raises
     ------
     DatasetError    for a folder of another version of gensig, changed, or not finished
+    ConfigError     for a record that the set does not have
     """
     manifest, config, plan = _finished(folder)
+    chosen = _chosen(folder, plan, records)
     here = environment()
     recorded = {name: str(manifest.environment.get(name, "")) for name in DECIDING}
     other = {
@@ -74,8 +78,6 @@ def reproduce(folder: Path, n_records: int) -> Reproduction:
         for name in DECIDING
         if recorded[name] != str(here[name])
     }
-    n_made = min(n_records, plan.n_records)
-    chosen = np.unique(np.linspace(0, plan.n_records - 1, n_made).round().astype(int))
     differences: dict[str, float] = {}
     refused, n_failed = 0, 0
     for start in range(0, len(chosen), BLOCK):
@@ -101,13 +103,32 @@ def reproduce(folder: Path, n_records: int) -> Reproduction:
 def recorded_row(folder: Path, record: str) -> tuple[Configuration, dict[str, Any]]:
     """Configuration of a data set and the row of one record, by its number or its id."""
     _, config, plan = _finished(folder)
+    return config, plan.record(_position(folder, plan, record, flag="--record"))
+
+
+def _chosen(
+    folder: Path, plan: Plan, records: int | Sequence[str]
+) -> NDArray[np.int64]:
+    """Positions in the plan of so many records or of some, ascending, each once."""
+    if isinstance(records, int):
+        n_made = min(records, plan.n_records)
+        places = np.linspace(0, plan.n_records - 1, n_made).round()
+    else:
+        places = np.array(
+            [_position(folder, plan, record, flag="--records") for record in records]
+        )
+    return np.unique(places.astype(np.int64))
+
+
+def _position(folder: Path, plan: Plan, record: str, *, flag: str) -> int:
+    """Position in the plan of a record's id or number."""
     ids = plan.columns["record_id"].tolist()
     if record in ids:
-        return config, plan.record(ids.index(record))
+        return int(ids.index(record))
     if record.isdecimal() and int(record) < plan.n_records:
-        return config, plan.record(int(record))
+        return int(record)
     raise ConfigError(
-        f"--record {record}: {folder} has records 0 to {plan.n_records - 1}, "
+        f"{flag} {record}: {folder} has records 0 to {plan.n_records - 1}, "
         f"ids {ids[0]} to {ids[-1]}"
     )
 

@@ -12,6 +12,7 @@ from gensig.errors import ConfigError, GensigError
 from gensig.terminal.interruptions import INTERRUPTED, TERMINATED, terminable
 from gensig.terminal.printing import remark, show_text
 from gensig.text import nearest
+from gensig.text.amounts import typed_count
 
 MISTAKE = 2
 EXITS = {
@@ -87,6 +88,9 @@ class Parser(argparse.ArgumentParser):
         try:
             return super()._get_value(action, arg_string)
         except argparse.ArgumentError:
+            count = typed_count(arg_string)
+            if action.type is int and count is not None:
+                return count
             kind = NUMBERS.get(action.type)
             if kind is None:
                 raise

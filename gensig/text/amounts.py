@@ -1,9 +1,13 @@
-"""Sizes and durations as people read them."""
+"""Sizes and durations as people read them, counts as people type them."""
 
 from __future__ import annotations
 
+import re
+
 SIZE_UNITS = ("B", "kB", "MB", "GB", "TB", "PB")
 STEP = 1000
+LARGEST_COUNT = 1e15  # above it not every whole number is a float
+DECIMAL = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d{1,3})?")
 MINUTE, HOUR, DAY = 60, 3600, 86_400  # s
 
 
@@ -25,3 +29,16 @@ def duration_text(seconds: float) -> str:
     if rest < DAY:
         return f"{rest // HOUR} h {rest % HOUR // MINUTE} min"
     return f"{rest // DAY} d {rest % DAY // HOUR} h"
+
+
+def typed_count(text: str) -> int | None:
+    """The whole number of a text such as '1e3' or '1000.0'.
+
+    None for digits alone, which need no reading, for other numbers and for other texts.
+    """
+    if text.lstrip("+-").isdigit() or not DECIMAL.fullmatch(text):
+        return None
+    number = float(text)
+    if not number.is_integer() or abs(number) > LARGEST_COUNT:
+        return None
+    return int(number)

@@ -22,6 +22,10 @@ class Notch(Fault):
 
     kind: ClassVar[str] = "notch"
     growth: ClassVar[Growth] = Growth.NONE
+    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("notch_length_mm",),
+        ("notch_depth_mm",),
+    )
     notch_length: float = unit("mm")
     notch_depth: float = unit("mm")
 

@@ -9,6 +9,7 @@ from gensig.dataset.folder.inspection import inspect as inspect_path
 from gensig.dataset.folder.verify import verify as verify_folder
 from gensig.errors import ConfigError
 from gensig.terminal.printing import show, show_text
+from gensig.text.amounts import typed_count
 
 
 def verify(arguments: Namespace) -> int:
@@ -33,9 +34,8 @@ def reproduce(arguments: Namespace) -> int:
     from gensig.production.reproduction import ACCEPTED
     from gensig.production.reproduction import reproduce as reproduce_records
 
-    if arguments.records < 1:
-        raise ConfigError(f"--records {arguments.records} must be at least 1")
-    result = reproduce_records(Path(arguments.folder), arguments.records)
+    records = _wanted_records(arguments.records)
+    result = reproduce_records(Path(arguments.folder), records)
     for name, (recorded, present) in result.other.items():
         recorded, present = recorded or "unknown", present or "unknown"
         show(f"made with {name} {recorded}, here is {present}")
@@ -53,6 +53,17 @@ def reproduce(arguments: Namespace) -> int:
         show(f"largest difference {largest:.2g} of the record's RMS, in {worst}")
         show(f"{result.n_refused} record(s) NOT reproduced; {accepted}")
     return int(result.n_refused > 0)
+
+
+def _wanted_records(given: str) -> int | list[str]:
+    """A number of records, or the ids or numbers of some, several with commas between them."""
+    count = typed_count(given)
+    if count is None and given.lstrip("-").isdecimal():
+        count = int(given)
+    records = [name for name in map(str.strip, given.split(",")) if name]
+    if not records or (count is not None and count < 1):
+        raise ConfigError(f"--records {given} must be at least 1, or name records")
+    return records if count is None else count
 
 
 def inspect(arguments: Namespace) -> int:

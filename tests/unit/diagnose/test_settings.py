@@ -23,6 +23,12 @@ REFUSALS = [
     ("batch_size=1", "must be a whole number of at least 2"),
     ("seeds=[]", "seeds must be a list"),
     ("seeds=null", "seeds must be a list"),
+    (
+        "seeds=3",
+        r"'seeds=\[3\]' trains once, with seed 3; 'seeds=\[0,1,2\]' trains three",
+    ),
+    ("epochs=[3]", f"epochs {WHOLE}, not"),
+    ("epochs=2.5e0", f"epochs {WHOLE}"),
     ("seeds=[1,1]", "seeds must be a list of different"),
     ("epoch_fraction=2", "epoch_fraction must be a number from 0 to 1"),
     ("learning_rate=high", "learning_rate must be a number"),
@@ -95,3 +101,9 @@ def test_many_examples_need_fewer_epochs_unless_epochs_are_given(
     n_drawn, words, epochs
 ):
     assert settings_of(*words).schedule.epochs_of(n_drawn) == epochs
+
+
+def test_counts_with_a_point_or_an_exponent_are_read():
+    settings = settings_of("epochs=1e1", "n_bootstrap=2e2", "window_samples=4096.0")
+    assert (settings.epochs, settings.n_bootstrap) == (10, 200)
+    assert settings.window_samples == 4096
