@@ -313,9 +313,12 @@ SET_VERBS = {
     ),
     "inspect": Verb(
         summary="what is in a data set or file",
-        examples=("gensig inspect runs/quickstart/shards/shard-00000.h5",),
+        examples=(
+            "gensig inspect runs/quickstart/shards/shard-00000.h5",
+            "gensig inspect missing.csv",
+        ),
         runs="gensig.commands.sets.checks:inspect",
-        arguments=(text("path", "PATH", "folder of a data set, or an HDF5 file"),),
+        arguments=(text("path", "PATH", "folder of a data set, HDF5 file or CSV"),),
     ),
     "report": Verb(
         summary="a data set as one HTML page: signals, spectra, parameters, indicators, splits",

@@ -49,6 +49,30 @@ def test_every_record_has_the_same_bits(reference, reproduce):
     assert reproduce(reference) == (0, "6 of 6 records have the same bits\n")
 
 
+@pytest.mark.parametrize(
+    ("given", "n"), [("r000003", 1), ("r000005,r000001,1", 2), ("2e0", 2), ("99", 6)]
+)
+def test_records_are_named_or_counted(reference, reproduce, given, n):
+    said = reproduce(reference, "--records", given)
+    assert said == (0, f"{n} of {n} records have the same bits\n")
+
+
+@pytest.mark.parametrize(
+    ("given", "answer"),
+    [
+        ("r000009", "--records r000009: .* has records 0 to 5, ids r000000 to r000005"),
+        ("0,crack", "--records crack: "),
+        ("0", "--records 0 must be at least 1"),
+        (",", "--records , must be at least 1, or name records"),
+        ("1.5", "--records 1.5: "),
+    ],
+)
+def test_a_record_that_is_none_is_refused(reference, capsys, given, answer):
+    assert main(["reproduce", str(reference), "--records", given]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert re.search(answer, line)
+
+
 def edit_manifest(folder, change):
     file = folder / "manifest.json"
     content = json.loads(file.read_text())

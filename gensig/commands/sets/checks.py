@@ -67,6 +67,12 @@ def _wanted_records(given: str) -> int | list[str]:
 
 
 def inspect(arguments: Namespace) -> int:
-    """Print what a data set or an HDF5 file holds."""
-    show_text(inspect_path(Path(arguments.path)))
+    """Print what a data set, an HDF5 file or a CSV holds."""
+    path = Path(arguments.path)
+    if path.suffix.lower() == ".csv" and path.is_file():
+        from gensig.commands.sets.table_text import table_text
+
+        show_text(table_text(arguments.path))
+        return 0
+    show_text(inspect_path(path))
     return 0

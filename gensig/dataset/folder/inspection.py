@@ -30,7 +30,7 @@ def inspect(path: Path) -> str:
         return _folder(path)
     if not path.exists():
         raise DatasetError(
-            f"{path} does not exist; give a data-set folder or an HDF5 file"
+            f"{path} does not exist; give a data-set folder, an HDF5 file or a CSV"
         )
     with open_file(path) as file:
         try:

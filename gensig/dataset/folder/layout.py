@@ -1,5 +1,6 @@
 """Names of the files in a data-set folder, and its manifest with the states of the shards."""
 
+import itertools
 import json
 import os
 import re
@@ -52,6 +53,7 @@ FILES_LIMIT = 1000  # that the manifest lists beside the shards
 COUNT_LIMIT = 2**63 - 1  # what fits numpy's integers
 CONFIG_BYTES_LIMIT = 1024**2
 CONFIG_DEPTH_LIMIT = 50
+MOST_LOOKED_AT, MOST_NAMED = 1000, 5  # folders, in a folder that is no data set
 
 # that of libyaml takes a seventh of the time, once in every process
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -214,8 +216,7 @@ def read_manifest(folder: Path) -> Manifest:
                 f"out={folder} again"
             )
         raise DatasetError(
-            f"{folder} is no gensig data set: it has no {MANIFEST}; give the folder that `gensig "
-            "generate` made"
+            f"{folder} is no gensig data set: it has no {MANIFEST}; {_what_to_give(folder)}"
         )
     try:
         content = json.loads(read_text(path, limit=TEXT_BYTES_LIMIT))
@@ -253,6 +254,27 @@ def read_manifest(folder: Path) -> Manifest:
             f"{path} is no JSON ({str(error)[:80]}); it is damaged, restore it from a copy"
         ) from error
     return manifest
+
+
+def _what_to_give(folder: Path) -> str:
+    """Advice in place of a folder that is no data set: those in it, the first by name."""
+    try:
+        with os.scandir(folder) as entries:
+            looked_at = list(itertools.islice(entries, MOST_LOOKED_AT))
+    except OSError:
+        looked_at = []
+    sets = sorted(entry.path for entry in looked_at if _holds_manifest(entry))
+    if not sets:
+        return "give the folder that `gensig generate` made"
+    shown = ", ".join(sets[:MOST_NAMED])
+    if more := len(sets) - MOST_NAMED:
+        shown += f" and {more} more" * (more > 0)
+    return f"it holds {len(sets)} data set{'s' * (len(sets) > 1)}, give one: {shown}"
+
+
+def _holds_manifest(entry: os.DirEntry[str]) -> bool:
+    is_folder = entry.is_dir(follow_symlinks=False)
+    return is_folder and (Path(entry.path) / MANIFEST).is_file()
 
 
 def _check_manifest(manifest: Manifest) -> None:

@@ -29,6 +29,11 @@ def test_simulate_writes_one_record(gensig, drawn, suffix, tmp_path, capsys):
         table = np.genfromtxt(file, delimiter=",", names=True)
         assert table.dtype.names == ("time_s", "pinion_y_m_per_s2", "wheel_y_m_per_s2")
         assert len(table) == 5120
+        said, _ = gensig("inspect record.csv")
+        assert "rate         51200 Hz" in said
+        assert "length       5120 samples, 0.1 s" in said
+        level = np.sqrt(np.mean(table["wheel_y_m_per_s2"] ** 2))
+        assert f"wheel_y_m_per_s2 (RMS {level:.4g})" in said
     wave, spectrum, envelope = drawn[0].values()
     assert wave.get_xlabel() == "time, s"
     assert wave.get_ylabel() == "acceleration, m/s$^2$"

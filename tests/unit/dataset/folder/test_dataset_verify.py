@@ -138,7 +138,25 @@ def test_interrupted_set_never_looks_whole(tmp_path, plan, n_shards):
     assert "incomplete" in inspect(folder)
 
 
-def test_folder_that_is_no_datasetting(tmp_path):
+def test_a_folder_of_data_sets_names_them(tmp_path, plan):
+    for name in "ba":
+        build(tmp_path / "runs" / name, plan)
+    runs = tmp_path / "runs"
+    (runs / "notes").mkdir()
+    (runs / "linked").symlink_to(tmp_path / "runs" / "a")
+    for read in (verify, inspect):
+        with pytest.raises(DatasetError) as refused:
+            read(runs)
+        advice = f"it holds 2 data sets, give one: {runs / 'a'}, {runs / 'b'}"
+        assert str(refused.value).endswith(advice)
+    for number in range(5):
+        (runs / f"c{number}").mkdir()
+        (runs / f"c{number}" / "manifest.json").touch()
+    with pytest.raises(DatasetError, match=r"it holds 7 data sets, .*c2 and 2 more$"):
+        verify(runs)
+
+
+def test_folder_that_is_no_data_set(tmp_path):
     with pytest.raises(DatasetError, match="no gensig data set"):
         verify(tmp_path)
     with pytest.raises(DatasetError, match="none does not exist"):
