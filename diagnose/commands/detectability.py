@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from diagnose.commands.parser import add_overrides
 from gensig.errors import ConfigError
@@ -21,17 +23,28 @@ there). The other knows indicators of other machines (seen). Both answer with d'
 sound and faulty records in standard deviations.
 
 OVERRIDES are those of gensig: fault=crack fault.crack_depth_mm=1 sensing=housing. The control is
-plan.sham=true."""
+plan.sham=true.
+
+--sizes and --snrs ask which size is found at which noise: a table and a figure of size by
+signal-to-noise ratio, at operating.speed_rpm and operating.torque_nm, in place of the maps."""
 EXAMPLE = """\
 examples:
   diagnose detectability fault=crack --plot crack.png --json crack.json
-  diagnose detectability fault=pitting sensing=housing --speeds 600 1200 2400 --torques 10 40"""
+  diagnose detectability fault=pitting sensing=housing --speeds 600 1200 2400 --torques 10 40
+  diagnose detectability fault=crack --sizes 0.5 1 2 3 --snrs 0 10 20 --plot sizes.png"""
 FIGURE_TYPES = (".png", ".svg", ".pdf")
 NOT_READ = {
     "out": "--json and --plot",
     "plan": "--n-units, --speeds, --torques",
     "executor": "--workers",
 }
+# Flags of the maps alone, and what to give in their place.
+OF_MAPS = {
+    "speeds": "give operating.speed_rpm=RPM",
+    "torques": "give operating.torque_nm=NM",
+    "fixed_noise": "leave it out",
+}
+RATIO = "sensing.snr_db"
 READ_OF_PLAN = ("plan.n_gearboxes", "plan.sham", "plan.vary")
 
 
@@ -49,6 +62,19 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--torques", nargs="+", metavar="NM", help=f"{shares} a quarter to twice)"
+    )
+    parser.add_argument(
+        "--sizes",
+        nargs="+",
+        metavar="SIZE",
+        help="of the fault, in the unit of its first size: crack_depth_mm, pit_length_mm, "
+        "wear_depth_um (default: with --snrs, a quarter to twice the configured one)",
+    )
+    parser.add_argument(
+        "--snrs",
+        nargs="+",
+        metavar="DB",
+        help="signal-to-noise ratios (default: with --sizes, 0 10 20 30)",
     )
     parser.add_argument(
         "--bandwidths",
@@ -84,22 +110,37 @@ def run(arguments: Namespace) -> int:
     if arguments.workers is not None and arguments.workers < 1:
         raise ConfigError(f"--workers {arguments.workers} must be at least 1")
     overrides = list(arguments.overrides)
-    speeds, torques, bandwidths = (
-        _numbers(f"--{name}", getattr(arguments, name), overrides)
-        for name in ("speeds", "torques", "bandwidths")
-    )
+    numbers = {
+        name: _numbers(f"--{name}", getattr(arguments, name), overrides)
+        for name in ("speeds", "torques", "bandwidths", "sizes", "snrs")
+    }
     _say_unread(overrides)
+    if numbers["sizes"] is not None or numbers["snrs"] is not None:
+        _refuse_of_maps(arguments)
+        return _sample(arguments, overrides, numbers, figure, table)
+    return _map(arguments, overrides, numbers, figure, table)
+
+
+def _map(
+    arguments: Namespace,
+    overrides: Sequence[str],
+    numbers: Mapping[str, list[float] | None],
+    figure: Path | None,
+    table: Path | None,
+) -> int:
+    """Maps over speed, torque, channel and bandwidth."""
     import gensig
     from diagnose.detectability.maps import confirm_best, make_maps, read_bandwidths
     from diagnose.detectability.summary import content, summary
     from diagnose.progress import progress
     from diagnose.workers import n_cores
 
+    bandwidths = numbers["bandwidths"]
     make_pairs = partial(
         gensig.fault_pairs,
         *overrides,
-        speeds_rpm=speeds,
-        torques_nm=torques,
+        speeds_rpm=numbers["speeds"],
+        torques_nm=numbers["torques"],
         n_units=arguments.n_units,
         fixed_noise=arguments.fixed_noise,
         config_dir=arguments.config_dir,
@@ -115,15 +156,92 @@ def run(arguments: Namespace) -> int:
     if maps.n_failed:
         show(f"{maps.n_failed} pairs did not stay finite and are left out")
     if table is not None:
-        import json
-
-        text = json.dumps(content(maps, confirmation), indent=1, allow_nan=False)
-        table.write_text(f"{text}\n", encoding="utf-8")
+        _write_json(table, content(maps, confirmation))
     if figure is not None:
         from diagnose.detectability.figure import detectability_figure
 
         detectability_figure(figure, maps)
     return 0
+
+
+def _sample(
+    arguments: Namespace,
+    overrides: Sequence[str],
+    numbers: Mapping[str, list[float] | None],
+    figure: Path | None,
+    table: Path | None,
+) -> int:
+    """Tables over the size of the fault and the signal-to-noise ratio."""
+    import gensig
+    from diagnose.detectability.maps import read_bandwidths
+    from diagnose.detectability.pairs import Pairs
+    from diagnose.detectability.sampling import make_sampling, read_axes
+    from diagnose.detectability.sampling_text import sampling_content, sampling_lines
+    from diagnose.progress import progress
+    from diagnose.workers import n_cores
+    from gensig.options.compose import override_keys
+
+    make = partial(
+        gensig.fault_pairs, n_units=arguments.n_units, config_dir=arguments.config_dir
+    )
+    with one_line_warnings("diagnose"):
+        base = make(*overrides)
+    size = f"fault.{base.size_key}"
+    typed = override_keys(overrides)
+    for key, flag in ((size, "--sizes"), (RATIO, "--snrs")):
+        if key in typed and numbers[flag.removeprefix("--")] is not None:
+            raise ConfigError(f"{key} is given twice; leave it out, or {flag}")
+    operating = base.config["operating"]
+
+    def pairs_of(value: float, ratio: float, epoch: int) -> Pairs:
+        sampled = (f"{size}={value!r}", f"{RATIO}={ratio!r}")
+        kept = [
+            word for word in overrides if word.partition("=")[0] not in (size, RATIO)
+        ]
+        return make(
+            *kept,
+            *sampled,
+            speeds_rpm=[operating["speed_rpm"]],
+            torques_nm=[operating["torque_nm"]],
+            epoch=epoch,
+        )
+
+    axes = read_axes(base, numbers["sizes"], numbers["snrs"])
+    edges = read_bandwidths(numbers["bandwidths"], base)
+    n_samples = len(axes.sizes) * len(axes.snrs_db)
+    with progress(n_samples, "simulating") as on_done:
+        sampling = make_sampling(
+            axes,
+            pairs_of,
+            edges,
+            n_workers=arguments.workers or n_cores(),
+            on_done=on_done,
+        )
+    show(*sampling_lines(sampling))
+    if n_failed := int(sampling.values("n_failed").sum()):
+        show(f"{n_failed} pairs did not stay finite and are left out")
+    if table is not None:
+        _write_json(table, sampling_content(sampling))
+    if figure is not None:
+        from diagnose.detectability.sampling_figure import sampling_figure
+
+        sampling_figure(figure, sampling)
+    return 0
+
+
+def _refuse_of_maps(arguments: Namespace) -> None:
+    """Refuse flags of the maps beside --sizes or --snrs."""
+    for name, instead in OF_MAPS.items():
+        if getattr(arguments, name):
+            flag = f"--{name.replace('_', '-')}"
+            raise ConfigError(
+                f"{flag} is of the maps, not of --sizes and --snrs; {instead}"
+            )
+
+
+def _write_json(path: Path, content: Mapping[str, Any]) -> None:
+    text = json.dumps(content, indent=1, allow_nan=False)
+    path.write_text(f"{text}\n", encoding="utf-8")
 
 
 def _say_unread(overrides: Sequence[str]) -> None:

@@ -55,6 +55,10 @@ class Pairs(Protocol):
         """Seconds of a record."""
 
     @property
+    def size_key(self) -> str | None:
+        """Key of the fault's first size; None for several faults or one without a size."""
+
+    @property
     def n_cells(self) -> int:
         """Speeds times torques."""
 

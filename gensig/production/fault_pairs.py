@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError, SimulationError
-from gensig.faults.registry import fault_parts, without_vary
+from gensig.faults.registry import FAULTS, fault_parts, without_vary
 from gensig.options.configuration import Configuration, whole_number
 from gensig.plan.condition_courses import SEED_KEY, settle_courses
 from gensig.plan.make import make_plan
@@ -100,6 +100,14 @@ class FaultPairs:
     rows: tuple[dict[str, Any], ...]
     noise_shape: Array | None
     fixed_power: Array | None
+
+    @property
+    def size_key(self) -> str | None:
+        """Key of the fault's first size; None for several faults or one without a size."""
+        fault = FAULTS.get(self.config["fault"]["kind"])
+        if fault is None or not fault.sizes:
+            return None
+        return fault.sizes[0][0]
 
     @property
     def n_cells(self) -> int:

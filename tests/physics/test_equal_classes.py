@@ -104,7 +104,7 @@ def test_the_least_torque_of_the_plan_counts():
     [
         (("fault=pitch_error", "fault.pitch_error_um=40"), [FREE]),
         (("fault=pitch_error", "fault.pitch_error_um=-40"), []),
-        (("fault=crack", "fault.crack_depth_mm=0"), ["changes nothing"]),
+        (("fault=wear", "fault.wear_profile=[0,0]"), ["changes nothing"]),
         (("fault=missing_tooth",), []),
         (("fault=crack",), []),
         (("fault=pitch_error", "fault.pitch_error_um=40", "plan.sham=true"), []),
