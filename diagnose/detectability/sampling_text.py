@@ -13,7 +13,6 @@ from diagnose.detectability.sampling import (
     found_from,
 )
 from diagnose.detectability.summary import short
-from gensig.units import split_unit
 
 WIDTH = 16  # of a column
 
@@ -49,8 +48,8 @@ def found_lines(sampling: Sampling) -> list[str]:
 
 def size_text(sampling: Sampling, number: int) -> str:
     """A sampled size with its unit, such as '1.5 mm'."""
-    unit = split_unit(sampling.axes.size_key)[1] or ""
-    return f"{sampling.axes.sizes[number]:g} {unit}".strip()
+    unit = sampling.axes.size_key.rpartition("_")[2]
+    return f"{sampling.axes.sizes[number]:g} {unit}"
 
 
 def sampling_content(sampling: Sampling) -> dict[str, Any]:
