@@ -37,7 +37,8 @@ from diagnose.studies.jobs import with_reference
 from diagnose.studies.study import task_from
 from diagnose.training.classes import Classes, predict_windows
 from diagnose.training.train import train_network
-from diagnose.workers import call_all, n_cores
+from diagnose.workers import call_all
+from gensig.execution.base import read_n_workers
 from gensig.options.compose import compose
 
 SEED = 11
@@ -179,7 +180,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Make the data set where it is missing, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, help="gets the data set")
-    parser.add_argument("--workers", type=int, default=n_cores())
+    parser.add_argument("--workers", type=int, default=read_n_workers(None))
     parser.add_argument(
         "--inputs",
         nargs="+",
@@ -210,4 +211,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    # worker processes import what they run by the name of its module
+    from benchmarks import machine_curve
+
+    machine_curve.main()

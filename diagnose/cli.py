@@ -22,6 +22,7 @@ from gensig.version import __version__
 # ``run(arguments) -> exit status``.
 VERBS = {
     "train": "train, judge and report",
+    "resume": "finish a study that was stopped",
     "evaluate": "judge a trained network",
     "predict": "try a trained network on a recording",
     "detect": "compare a recording with healthy ones of the same gearbox",
@@ -34,7 +35,6 @@ VERBS = {
 OF_GENSIG = (
     "generate",
     "plan",
-    "resume",
     "inspect",
     "simulate",
     "options",

@@ -4,30 +4,21 @@ from __future__ import annotations
 
 import ctypes
 import multiprocessing
-import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from functools import partial
 from typing import Any
 
 from gensig.errors import GensigError
+from gensig.execution.base import ShardFailure
+from gensig.execution.pool import results_of
 from gensig.text.escaping import set_warning_lines
 
 # glibc, malloc.h: above which size a block has pages of its own, and how much freed memory
 # at the end of the heap goes back to the system
 _MALLOPT = {"M_TRIM_THRESHOLD": -1, "M_MMAP_THRESHOLD": -3}
 _KEPT_BYTES = 1 << 30
-
-_worker: dict[str, Any] = {}
-
-
-def n_cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def call_all(
@@ -41,45 +32,36 @@ def call_all(
 ) -> list[Any]:
     """Results of ``function(*shared, item)`` in the order of the items.
 
-    The calls run in spawned processes, or in this one for one worker or one item.
+    The calls run as `gensig.execution.pool.results_of` says.
 
     Parameters
     ----------
+    items : hashable, each once
     on_done : is given each item and its result as soon as it is there
     remedy : advice of the error where a process was killed
 
     Raises
     ------
-    GensigError    as raised by a call, or if a process was killed
+    GensigError    as raised by a call, or if a process was killed again and again
     """
-    results = []
-    if n_workers == 1 or len(items) == 1:
-        keep_freed_memory()
-        with one_thread():
-            for item in items:
-                results.append(function(*shared, item))
-                on_done(item, results[-1])
-        return results
-    before = set(multiprocessing.active_children())
-    context = multiprocessing.get_context("spawn")
-    executor = ProcessPoolExecutor(
-        min(n_workers, len(items)), context, _start, (function, shared)
-    )
-    try:
-        futures = {executor.submit(_call, item): item for item in items}
-        for future in as_completed(futures):
-            on_done(futures[future], future.result())
-        return [future.result() for future in futures]
-    except KeyboardInterrupt:
-        # SIGTERM reaches this process alone: no call is waited for.
-        for process in set(multiprocessing.active_children()) - before:
-            process.terminate()
-        raise
-    except BrokenProcessPool:
-        reason = f"a worker process was killed (out of memory?); {remedy}"
-        raise GensigError(reason) from None
-    finally:
-        executor.shutdown(wait=True, cancel_futures=True)
+    call = partial(_call, function, tuple(shared))
+    done: dict[Any, Any] = {}
+    with closing(results_of(call, items, n_workers=n_workers)) as results:
+        for item, result in results:
+            if isinstance(result, ShardFailure):
+                raise GensigError(f"{result.reason} (out of memory?); {remedy}")
+            done[item] = result
+            on_done(item, result)
+    return [done[item] for item in items]
+
+
+def _call(function: Callable[..., Any], shared: tuple[Any, ...], item: Any) -> Any:
+    """Result of one call on one thread."""
+    if multiprocessing.parent_process() is not None:
+        set_warning_lines("diagnose")
+    keep_freed_memory()
+    with one_thread():
+        return function(*shared, item)
 
 
 @contextmanager
@@ -112,15 +94,3 @@ def keep_freed_memory() -> bool:
     except (AttributeError, OSError, TypeError):
         return False
     return all(bool(mallopt(option, _KEPT_BYTES)) for option in _MALLOPT.values())
-
-
-def _start(function: Callable[..., Any], shared: Sequence[Any]) -> None:
-    set_warning_lines("diagnose")
-    keep_freed_memory()
-    limit = one_thread()
-    limit.__enter__()
-    _worker.update(function=function, shared=shared, limit=limit)
-
-
-def _call(item: Any) -> Any:
-    return _worker["function"](*_worker["shared"], item)

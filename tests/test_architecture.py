@@ -108,7 +108,7 @@ DIAGNOSE = {
     "baselines": "data networks scoring",
     "bridge": "data detection report scoring settings studies training",
     "commands": "bridge data detectability detection progress recordings report settings "
-    "studies training workers",
+    "studies training",
     "detectability": "workers",
     "detection": "data recordings",
     "networks": "data",
@@ -119,10 +119,12 @@ DIAGNOSE = {
     "studies": "baselines data networks scoring settings training workers",
     "training": "data networks scoring settings",
 }
-# What diagnose imports of gensig: the reading side of data sets, signals and words; no physics.
+# What diagnose imports of gensig: the reading side of data sets, processes, signals and words; no
+# physics.
 OF_GENSIG = {
     "dataset",
     "errors",
+    "execution",
     "implants",
     "measured",
     "options",

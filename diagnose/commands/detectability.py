@@ -133,7 +133,7 @@ def _map(
     from diagnose.detectability.maps import confirm_best, make_maps, read_bandwidths
     from diagnose.detectability.summary import content, summary
     from diagnose.progress import progress
-    from diagnose.workers import n_cores
+    from gensig.execution.base import read_n_workers
 
     bandwidths = numbers["bandwidths"]
     make_pairs = partial(
@@ -149,7 +149,7 @@ def _map(
         pairs = make_pairs()
     edges = read_bandwidths(bandwidths, pairs)
     with progress(pairs.n_cells, "simulating") as on_done:
-        n_workers = arguments.workers or n_cores()
+        n_workers = read_n_workers(arguments.workers)
         maps = make_maps(pairs, edges, n_workers=n_workers, on_done=on_done)
     confirmation = confirm_best(maps, make_pairs(epoch=1))
     show(*summary(maps, confirmation))

@@ -25,8 +25,8 @@ new_machine, by_unit and cross_specimen, as far as the data set has them. task=r
 predicts how long each machine still runs, on data sets that run to failure.
 
   data=DIR    data set made by gensig generate
-  out=DIR     folder to write; must not exist or be empty. Receives report.html, metrics.json,
-              figures, models/
+  out=DIR     folder to write; must not exist, be empty, or hold the same study, which was stopped
+              and goes on. Receives report.html, metrics.json, figures, models/
 
 Every other key=value overrides configs/train.yaml, model=NAME chooses a file of configs/model."""
 EXAMPLE = """\
@@ -62,13 +62,46 @@ def run(arguments: Namespace) -> int:
     overrides, config_dir = arguments.overrides, arguments.config_dir
     if not arguments.multirun:
         override_keys(overrides)
-        _train_one(_composed(overrides, config_dir))
+        config = _composed(overrides, config_dir)
+        refuse_used(Path(config["out"]), config)
+        train_one(config)
         return 0
     jobs = _expand(overrides, config_dir)
     for number, config in enumerate(jobs, start=1):
-        tell(f"run {number} of {len(jobs)}: {config['out']}")
-        _train_one(config)
+        out, which = Path(config["out"]), f"run {number} of {len(jobs)}"
+        if _is_complete(out):
+            tell(f"{which}: {out} is complete")
+            continue
+        tell(f"{which}: {out}")
+        train_one(config)
     return 0
+
+
+def refuse_used(out: Path, config: Configuration) -> None:
+    """Refuse a folder that holds anything but the same study, which was stopped.
+
+    Raises
+    ------
+    DatasetError    also where another process is at work there
+    """
+    from diagnose.training.study_folder import (
+        holds_study,
+        is_blank,
+        refuse_in_work,
+        require_same,
+    )
+
+    refuse_in_work(out)
+    if holds_study(out) and not require_same(out, config).is_complete:
+        return
+    if not is_blank(out):
+        refuse_existing(out)
+
+
+def _is_complete(out: Path) -> bool:
+    from diagnose.training.study_folder import holds_study, read_study
+
+    return holds_study(out) and read_study(out).is_complete
 
 
 def _composed(overrides: Sequence[str], config_dir: str | None) -> Configuration:
@@ -89,8 +122,10 @@ def _composed(overrides: Sequence[str], config_dir: str | None) -> Configuration
 def _expand(overrides: Sequence[str], config_dir: str | None) -> list[Configuration]:
     """Configurations of a multirun, each with its own ``out``.
 
-    All composed before the first one runs.
+    All composed before the first one runs. The folders may be there where the same runs were
+    stopped.
     """
+    from diagnose.training.study_folder import holds_study, is_blank, require_same
     from gensig.options.compose import job_folders, sweep
 
     jobs = sweep(overrides, config_dir=config_dir)
@@ -101,32 +136,47 @@ def _expand(overrides: Sequence[str], config_dir: str | None) -> list[Configurat
             "out must be one folder; with -m each run gets a folder below it"
         )
     parent = Path(parents.pop())
-    refuse_existing(parent)
     folders = [str(parent / name) for name in job_folders(jobs)]
-    return [
+    configs = [
         config.with_entries(out=out)
         for config, out in zip(configs, folders, strict=True)
     ]
+    done = [
+        require_same(Path(out), config).is_complete
+        for out, config in zip(folders, configs, strict=True)
+        if holds_study(Path(out))
+    ]
+    is_left = parent.is_dir() and all(map(is_blank, parent.iterdir()))
+    if done.count(True) == len(configs) or not (done or is_left):
+        refuse_existing(parent)
+    for out, config in zip(folders, configs, strict=True):
+        if not _is_complete(Path(out)):
+            refuse_used(Path(out), config)
+    return configs
 
 
-def _train_one(config: Configuration) -> None:
-    """Run the study of one configuration."""
+def train_one(config: Configuration) -> None:
+    """Run the study of one configuration, or go on with it in a folder that was begun."""
     from diagnose.settings import settings_from
+    from diagnose.training.study_folder import holds_study, quoted
 
     settings = settings_from(config)
     out = Path(settings.out)
-    refuse_existing(out)
     try:
-        page, lines = STUDIES[settings.task](settings, out)
+        page, lines = STUDIES[settings.task](settings, config)
     except KeyboardInterrupt:
-        if not out.exists():
-            raise
-        raise Interrupted(f"{out} is incomplete; remove it and train again") from None
+        if not holds_study(out):
+            raise Interrupted("run the same command again") from None
+        raise Interrupted(
+            f"{out} is incomplete, and diagnose resume {quoted(out)} finishes it"
+        ) from None
     show(*lines)
     show(f"report: {page}")
 
 
-def _study_classes(settings: TrainSettings, out: Path) -> tuple[Path, list[str]]:
+def _study_classes(
+    settings: TrainSettings, config: Configuration
+) -> tuple[Path, list[str]]:
     """Page and tables of a study that tells classes apart."""
     from diagnose.data.protocols import choose_protocols
     from diagnose.recordings.found_faults import found_fault_pictures
@@ -134,20 +184,30 @@ def _study_classes(settings: TrainSettings, out: Path) -> tuple[Path, list[str]]
     from diagnose.report.novelty_report import novelty_tables
     from diagnose.report.page import result_table, without_interval, write_report
     from diagnose.studies.study import baselines_left_out, plan_study, run_study
+    from diagnose.training.study_folder import complete_study, study_at_work
 
     task, settings = _opened(settings)
+    out = Path(settings.out)
     protocols, jobs = plan_study(task, settings)
     left_out = choose_protocols(task, settings.protocols)[1]
     for name, reason in baselines_left_out(task, settings, protocols).items():
         tell(f"baseline {name} is left out of {reason}")
-    with _started(out, len(jobs), left_out) as on_done:
-        metrics = run_study(
-            task, settings, out, protocols=protocols, jobs=jobs, on_done=on_done
-        )
-    shown: list[tuple[str, str]] = []
-    if protocol := headline_protocol(metrics):
-        shown = found_fault_pictures(out, task, protocol, metrics["model"])
-    page = write_report(out, metrics, shown)
+    with study_at_work(out, config) as kept_in:
+        with _progress(len(jobs), left_out) as on_done:
+            metrics = run_study(
+                task,
+                settings,
+                out,
+                protocols=protocols,
+                jobs=jobs,
+                kept_in=kept_in,
+                on_done=on_done,
+            )
+        shown: list[tuple[str, str]] = []
+        if protocol := headline_protocol(metrics):
+            shown = found_fault_pictures(out, task, protocol, metrics["model"])
+        page = write_report(out, metrics, shown)
+        complete_study(out)
     tables = [
         *headlines(metrics),
         *result_table(metrics),
@@ -156,7 +216,9 @@ def _study_classes(settings: TrainSettings, out: Path) -> tuple[Path, list[str]]
     return page, tables + without_interval(metrics)
 
 
-def _study_lives(settings: TrainSettings, out: Path) -> tuple[Path, list[str]]:
+def _study_lives(
+    settings: TrainSettings, config: Configuration
+) -> tuple[Path, list[str]]:
     """Page and tables of a study of remaining lives."""
     from diagnose.data.lives import lives_of
     from diagnose.report.life_report import life_tables, write_life_report
@@ -165,19 +227,23 @@ def _study_lives(settings: TrainSettings, out: Path) -> tuple[Path, list[str]]:
         plan_life_study,
         run_life_study,
     )
+    from diagnose.training.study_folder import complete_study, study_at_work
 
     check_life_settings(settings)
     task, settings = _opened(settings)
+    out = Path(settings.out)
     plan = plan_life_study(task, settings)
-    with _started(out, len(plan.jobs), plan.left_out) as on_done:
-        metrics, predictions = run_life_study(
-            task, settings, out, plan, on_done=on_done
-        )
-    page = write_life_report(out, metrics, lives_of(task), predictions)
+    with study_at_work(out, config) as kept_in:
+        with _progress(len(plan.jobs), plan.left_out) as on_done:
+            metrics, predictions = run_life_study(
+                task, settings, out, plan, kept_in=kept_in, on_done=on_done
+            )
+        page = write_life_report(out, metrics, lives_of(task), predictions)
+        complete_study(out)
     return page, life_tables(metrics)
 
 
-# Task, one of `diagnose.settings.TASKS` -> its study, which writes into a folder.
+# Task, one of `diagnose.settings.TASKS` -> its study, which writes into the folder ``out``.
 STUDIES = {"classes": _study_classes, "remaining_life": _study_lives}
 
 
@@ -201,16 +267,13 @@ def _opened(settings: TrainSettings) -> tuple[Task, TrainSettings]:
     return task, chosen
 
 
-def _started(
-    out: Path,
-    n_jobs: int,
-    left_out: Mapping[str, str],
+def _progress(
+    n_jobs: int, left_out: Mapping[str, str]
 ) -> AbstractContextManager[Callable[[str], None]]:
-    """Progress of a study, whose folder now exists and whose missing protocols are named."""
+    """Progress of a study, whose missing protocols are named."""
     from diagnose.data.protocols import left_out_lines
     from diagnose.progress import progress
 
     for line in left_out_lines(left_out):
         tell(line)
-    out.mkdir(parents=True, exist_ok=True)
     return progress(n_jobs)

@@ -18,6 +18,7 @@ from diagnose.training.model_files import (
     facts_of,
 )
 from diagnose.training.store import ModelDescription, load_domain, read_description
+from diagnose.training.study_folder import refuse_unfinished
 from gensig.errors import DatasetError, GensigError
 
 MOST_MODELS = 10_000
@@ -59,10 +60,11 @@ def models_in(folder: Path) -> list[Path]:
 
     Raises
     ------
-    DatasetError    for a folder without any
+    DatasetError    for a folder without any, and for a study that is not finished
     """
     if os.path.lexists(folder / DESCRIPTION):
         return [folder]
+    refuse_unfinished(folder)
     below = folder / "models"
     parent = below if below.is_dir() else folder
     models = []

@@ -37,6 +37,7 @@ from diagnose.studies.baseline_runs import (
     shuffle_method,
 )
 from diagnose.studies.canaries import canary_labels, counted, with_canaries
+from diagnose.studies.kept_jobs import KeptJobs, keep_outcomes, kept_outcomes
 from diagnose.studies.novelty import (
     NoveltyRun,
     fitted_runs,
@@ -92,25 +93,49 @@ def run_jobs(
     n_workers: int,
     on_done: Callable[[list[Any]], None],
     run: Callable[[Task, TrainSettings, Job], list[Any]] | None = None,
+    kept: KeptJobs | None = None,
 ) -> list[Any]:
     """Outcomes of all jobs in the order of the jobs, each by `run_job` or ``run``.
+
+    Parameters
+    ----------
+    kept : has the outcomes of jobs that are finished, and gets those of the others
 
     Raises
     ------
     GensigError    as raised by a job, or if a worker was killed
     """
+    function, done = run or run_job, {}
+    if kept is not None:
+        found = {job: kept_outcomes(kept, job) for job in jobs}
+        done = {job: each for job, each in found.items() if each is not None}
+        function = partial(_run_and_keep, kept, function)
+    for outcomes in done.values():
+        on_done(outcomes)
+    missing = [job for job in jobs if job not in done]
     try:
         results = call_all(
-            run or run_job,
+            function,
             (task, settings),
-            jobs,
+            missing,
             n_workers=n_workers,
             on_done=lambda _, outcomes: on_done(outcomes),
             remedy="set n_threads=1 or use fewer records",
         )
     finally:
         _forget_inputs()
-    return [outcome for outcomes in results for outcome in outcomes]
+    done |= dict(zip(missing, results, strict=True))
+    return [outcome for job in jobs for outcome in done[job]]
+
+
+def _run_and_keep(
+    kept: KeptJobs,
+    run: Callable[[Task, TrainSettings, Job], list[Any]],
+    task: Task,
+    settings: TrainSettings,
+    job: Job,
+) -> list[Any]:
+    return keep_outcomes(kept, job, run(task, settings, job))
 
 
 def _forget_inputs() -> None:

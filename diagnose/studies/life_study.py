@@ -17,6 +17,7 @@ from diagnose.data.lives import (
     lives_of,
 )
 from diagnose.data.windows import SUBSETS, Task
+from diagnose.networks.domain import Domain
 from diagnose.scoring.life_scores import (
     UNITS,
     Snapshots,
@@ -30,15 +31,18 @@ from diagnose.scoring.machines import LIVES, Machines, machines_of
 from diagnose.settings import BOTH, TrainSettings
 from diagnose.studies.counts import by_method, n_different, run_notes
 from diagnose.studies.jobs import Job, run_jobs
+from diagnose.studies.kept_jobs import kept_jobs
 from diagnose.studies.life_jobs import AGE_ONLY, LifePrediction, run_life_job
 from diagnose.studies.protocol_results import BOOTSTRAP_SEED
 from diagnose.studies.result_files import Entry, save_network, study_facts, write_rows
 from diagnose.studies.study import check_network
-from diagnose.workers import n_cores
+from diagnose.training.life_store import LifeFacts
 from gensig.errors import ConfigError
+from gensig.execution.base import read_n_workers
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
+OUTCOME_KINDS = (LifePrediction, LifeFacts, Domain)
 
 
 def check_life_settings(settings: TrainSettings) -> None:
@@ -100,6 +104,7 @@ def run_life_study(
     folder: Path,
     plan: LifePlan,
     *,
+    kept_in: Path | None = None,
     on_done: Callable[[str], None] = lambda line: None,
 ) -> tuple[Entry, list[LifePrediction]]:
     """Content of ``metrics.json``, and the predictions.
@@ -107,6 +112,7 @@ def run_life_study(
     Parameters
     ----------
     folder : exists; receives ``predictions.csv`` and ``models/<protocol>-<method>-seed<k>``
+    kept_in : folder of finished jobs, from which a study that was stopped goes on; None keeps none
     on_done : is given one line for each finished job
     """
     started = time.perf_counter()
@@ -114,9 +120,10 @@ def run_life_study(
         task,
         settings,
         plan.jobs,
-        n_workers=settings.n_threads or n_cores(),
+        n_workers=read_n_workers(settings.n_threads),
         on_done=lambda runs: on_done(_progress_line(runs)),
         run=run_life_job,
+        kept=kept_jobs(task, settings, plan.protocols, kept_in, OUTCOME_KINDS),
     )
     lives = lives_of(task)
     for run in predictions:

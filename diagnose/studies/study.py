@@ -27,13 +27,14 @@ from diagnose.data.windows import (
     subsets_of,
     task_of,
 )
+from diagnose.networks.domain import Domain
 from diagnose.networks.registry import (
     build_model,
     check_example,
     has_window_length,
     input_of,
 )
-from diagnose.scoring.predictions import Prediction, write_predictions
+from diagnose.scoring.predictions import Prediction, Rows, write_predictions
 from diagnose.settings import BOTH, TrainSettings
 from diagnose.studies.answers import leak_answer
 from diagnose.studies.baseline_runs import reasons_left_out
@@ -46,6 +47,7 @@ from diagnose.studies.jobs import (
     run_jobs,
     with_reference,
 )
+from diagnose.studies.kept_jobs import kept_jobs
 from diagnose.studies.novelty import NoveltyRun
 from diagnose.studies.novelty_metrics import (
     check_open_protocol,
@@ -64,12 +66,14 @@ from diagnose.studies.result_files import Entry, network_name, save_network, stu
 from diagnose.training.autoencoder import check_window_for_autoencoder
 from diagnose.training.tensorboard import need_tensorboard, write_scores
 from diagnose.training.train import device_of
-from diagnose.workers import n_cores
 from gensig.errors import ConfigError
+from gensig.execution.base import read_n_workers
 from gensig.options.configuration import Section
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
+
+OUTCOME_KINDS = (Prediction, Rows, Domain, NoveltyRun)
 
 
 def plan_study(
@@ -200,6 +204,7 @@ def run_study(
     *,
     protocols: Sequence[str],
     jobs: Sequence[Job],
+    kept_in: Path | None = None,
     on_done: Callable[[str], None] = lambda line: None,
 ) -> Entry:
     """Run the jobs, write the models below `folder` and return the content of ``metrics.json``.
@@ -209,6 +214,7 @@ def run_study(
     task, settings : of the study
     folder : exists; receives ``models/<protocol>-seed<k>`` and ``predictions.csv``
     protocols, jobs : of `plan_study`
+    kept_in : folder of finished jobs, from which a study that was stopped goes on; None keeps none
     on_done : is given one line for each finished job
     """
     started = time.perf_counter()
@@ -216,8 +222,9 @@ def run_study(
         task,
         settings,
         jobs,
-        n_workers=settings.n_threads or n_cores(),
+        n_workers=read_n_workers(settings.n_threads),
         on_done=lambda runs: on_done(_progress_line(runs)),
+        kept=kept_jobs(task, settings, protocols, kept_in, OUTCOME_KINDS),
     )
     predictions = [run for run in outcomes if isinstance(run, Prediction)]
     novelty = [run for run in outcomes if isinstance(run, NoveltyRun)]

@@ -26,6 +26,7 @@ from diagnose.training.model_files import (
     tensors_of,
     write_files,
 )
+from diagnose.training.study_folder import refuse_unfinished
 from gensig.errors import DatasetError
 from gensig.options.configuration import Section
 
@@ -337,11 +338,14 @@ def read_description(folder: str | Path) -> ModelDescription:
 
     Raises
     ------
-    DatasetError    for a folder without such a file, or another schema
+    DatasetError    for a folder without such a file, also where it is that of a study which is not
+        finished, or another schema
     """
     folder = Path(folder)
     path = folder / DESCRIPTION
     if not os.path.lexists(path):
+        for study in (folder, *folder.parents[:2]):
+            refuse_unfinished(study)
         raise DatasetError(_no_model(folder))
     content = read_content(folder)
     content.pop(DIGEST, None)

@@ -1,0 +1,173 @@
+"""Calls on processes of this machine, one in hand each; a process that dies is replaced.
+
+Shards of data sets and trainings of networks are such calls.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import warnings
+from collections import Counter, deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import connection
+from typing import Any, TypeVar
+
+from gensig.execution.base import THREAD_VARIABLES, TRIES, ShardFailure, T
+from gensig.execution.held_signals import interrupts_unseen, stops_held
+from gensig.text.escaping import set_warning_lines
+
+Item = TypeVar("Item")
+HELD_SECONDS = 0.2  # longest that a signal waits while results are waited for
+
+_worker: dict[str, Callable[[Any], Any]] = {}
+
+
+def results_of(
+    call: Callable[[Item], T], items: Sequence[Item], *, n_workers: int
+) -> Generator[tuple[Item, T | ShardFailure], None, None]:
+    """Items and their results as they come.
+
+    One worker, or one item, runs in this process. Otherwise each worker is a process that gets
+    ``call`` once and one item at a time. Of a worker that dies it is known which item it had in
+    hand; this item is begun again, up to ``TRIES`` times in all, and has a failure then. What a
+    call raises is raised here. However this ends, no worker is left.
+
+    Parameters
+    ----------
+    call : picklable, and safe to run twice on an item
+    items : hashable, each once
+    """
+    if n_workers == 1 or len(items) <= 1:
+        for item in items:
+            yield item, call(item)
+        return
+    before = set(multiprocessing.active_children())
+    waiting, tries = deque(items), Counter[Item]()
+    # A pool a worker: when one dies, it is known which item it had in hand.
+    idle = [_pool(call) for _ in range(min(n_workers, len(waiting)))]
+    at_work: dict[Future[T], tuple[ProcessPoolExecutor, Item]] = {}
+    try:
+        while waiting or at_work:
+            while waiting and idle:
+                pool, item = idle.pop(), waiting.popleft()
+                pool, future = _submit(pool, call, item)
+                at_work[future] = pool, item
+            for future in _finished(at_work):
+                pool, item = at_work.pop(future)
+                result: T | ShardFailure
+                try:
+                    result = future.result()
+                except BrokenProcessPool:
+                    pool.shutdown(wait=False)
+                    pool = _pool(call)
+                    tries[item] += 1
+                    if tries[item] < TRIES:
+                        waiting.append(item)
+                        idle.append(pool)
+                        continue
+                    result = ShardFailure(
+                        reason=f"its worker process died {TRIES} times"
+                    )
+                idle.append(pool)
+                yield item, result
+    except BaseException:
+        # What was in hand is lost: it lies in temporary files, if anywhere.
+        with stops_held():
+            for process in set(multiprocessing.active_children()) - before:
+                process.kill()
+        raise
+    finally:
+        with stops_held():
+            for pool in [*idle, *(pool for pool, _ in at_work.values())]:
+                pool.shutdown(cancel_futures=True)
+
+
+def _pool(call: Callable[[Any], Any]) -> ProcessPoolExecutor:
+    """A pool of one process, which starts with its first item."""
+    for name in THREAD_VARIABLES:
+        os.environ.setdefault(name, "1")
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(
+        1,
+        mp_context=context,
+        initializer=_begin_worker,
+        initargs=(call, _is_quiet()),
+    )
+
+
+def _submit(
+    pool: ProcessPoolExecutor, call: Callable[[Item], T], item: Item
+) -> tuple[ProcessPoolExecutor, Future[T]]:
+    """Give a worker an item; one that died while it had none is replaced first."""
+    with stops_held(), interrupts_unseen(), _main_unknown():
+        try:
+            return pool, pool.submit(_call, item)
+        except BrokenProcessPool:
+            pool.shutdown(wait=False)
+            pool = _pool(call)
+            return pool, pool.submit(_call, item)
+
+
+def _finished(futures: Iterable[Future[T]]) -> set[Future[T]]:
+    """At least one future that is done.
+
+    A signal waits for the locks of the futures, which an exception would leave locked.
+    """
+    done: set[Future[T]] = set()
+    while not done:
+        with stops_held():
+            done = wait(futures, HELD_SECONDS, return_when=FIRST_COMPLETED).done
+    return done
+
+
+@contextmanager
+def _main_unknown() -> Iterator[None]:
+    """Processes that start in this block do not run the user's script again to import it.
+
+    A script that calls ``gensig.generate`` needs no ``if __name__ == "__main__"`` then: jobs are
+    importable without it.
+    """
+    main = sys.modules["__main__"]
+    # multiprocessing.spawn.get_preparation_data reads these two.
+    names = {"__spec__", "__file__"} & vars(main).keys()
+    hidden: dict[str, Any] = {name: vars(main)[name] for name in names}
+    main.__spec__ = None
+    vars(main).pop("__file__", None)
+    try:
+        yield
+    finally:
+        main.__dict__.update(hidden)
+
+
+def _is_quiet() -> bool:
+    """True where this process shows no warnings, as with ``--quiet``."""
+    first = warnings.filters[0] if warnings.filters else ("default", None, None)
+    return first[0] == "ignore" and first[2] is UserWarning
+
+
+def _begin_worker(call: Callable[[Any], Any], is_quiet: bool) -> None:
+    """Leave Ctrl-C to the parent, show warnings as it does, and end when the parent ends."""
+    set_warning_lines("gensig")
+    if is_quiet:
+        warnings.simplefilter("ignore", UserWarning)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+    _worker["call"] = call
+
+
+def _end_with(sentinel: Any) -> None:
+    connection.wait([sentinel])
+    os._exit(1)
+
+
+def _call(item: Any) -> Any:
+    return _worker["call"](item)
