@@ -1,5 +1,5 @@
 """Kill commands, go on as they say, compare: ``python -m benchmarks.kill_campaign [--kills 200]
-[--verbs 100] [--full 50]``.
+[--verbs 100] [--full 50] [--train 50]``.
 
 With ``--verbs`` every verb that writes is killed before one of its file operations, typed again,
 and followed where it names a command (``benchmarks/_kill_verbs.py``). Files must be whole or absent
@@ -11,8 +11,12 @@ times; then it is resumed, verified, and every file that counts as the data set 
 uninterrupted run byte by byte. After each kill the folder must not look whole unless it is; one
 that was killed before it had a manifest is begun again by the same command.
 
-Most runs are forked from this process, which has imported and compiled everything, so that
-kills fall into planning, writing and closing; one in ``COMMAND_EVERY`` is the command itself
+With ``--train`` studies of ``diagnose train`` are stopped (SIGKILL, SIGTERM, SIGINT, of the parent
+alone or of its group), gone on with, and compared (``benchmarks/_kill_training.py``). A stop must
+leave no process, and SIGTERM and SIGINT say one line.
+
+Most runs of data sets are forked from this process, which has imported and compiled everything, so
+that kills fall into planning, writing and closing; one in ``COMMAND_EVERY`` is the command itself
 with two workers, imports included, of which the parent or a worker is killed. Needs Linux
 (/proc). The exit status is 1 for any difference, and where too few kills fell before the end of
 a run.
@@ -32,6 +36,7 @@ import tempfile
 import time
 from abc import ABC, abstractmethod
 from collections import Counter
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
@@ -285,9 +290,24 @@ def verbs_campaign(
     n_kills: int, seed: int, folder: Path, *, full: bool = False
 ) -> tuple[Counter[str], list[str]]:
     """Kills by verb, and every way in which one was not as it should be; see `kill_verbs`."""
+    return _counted(kill_verbs(n_kills, seed, folder, full=full))
+
+
+def train_campaign(
+    n_kills: int, seed: int, folder: Path
+) -> tuple[Counter[str], list[str]]:
+    """Stops by kind, and every way in which one was not as it should be; see `kill_trainings`."""
+    from benchmarks._kill_training import kill_trainings
+
+    return _counted(kill_trainings(n_kills, seed, folder))
+
+
+def _counted(
+    stopped: Iterable[tuple[str, list[str]]],
+) -> tuple[Counter[str], list[str]]:
     outcome: Counter[str] = Counter()
     problems: list[str] = []
-    for name, lines in kill_verbs(n_kills, seed, folder, full=full):
+    for name, lines in stopped:
         outcome[name] += 1
         problems += lines
         print(f"{outcome.total()}: {name}", *lines, sep="\n  ", file=sys.stderr)
@@ -299,6 +319,7 @@ def main() -> int:
     parser.add_argument("--kills", type=int, default=200, help="at random moments")
     parser.add_argument("--verbs", type=int, default=0, help="of all verbs that write")
     parser.add_argument("--full", type=int, default=0, help="full disks, of all verbs")
+    parser.add_argument("--train", type=int, default=0, help="of studies")
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     begin, status = time.monotonic(), 0
@@ -306,6 +327,7 @@ def main() -> int:
         (campaign, arguments.kills),
         (verbs_campaign, arguments.verbs),
         (functools.partial(verbs_campaign, full=True), arguments.full),
+        (train_campaign, arguments.train),
     )
     for run, n_kills in parts:
         if not n_kills:
