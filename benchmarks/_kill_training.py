@@ -23,6 +23,7 @@ from pathlib import Path
 import diagnose.commands.resume
 import diagnose.report.page
 import diagnose.studies.study
+from benchmarks._process_groups import alive_in_group
 from diagnose.cli import main as diagnose
 from diagnose.training.study_folder import FINISHED_JOBS, STUDY, read_study
 from gensig.cli import main as gensig
@@ -110,18 +111,6 @@ def _run(words: list[str], folder: Path, told: Path, is_command: bool) -> None:
     os._exit(status)
 
 
-def alive_in_group(group: int) -> list[str]:
-    """Commands of a process group that still run."""
-    result = []
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        with suppress(OSError):
-            state, _, own_group = path.read_text().rpartition(")")[2].split()[:3]
-            if int(own_group) == group and state not in "ZX":
-                words = (path.parent / "cmdline").read_bytes().split(b"\0")
-                result.append(b" ".join(words[:4]).decode())
-    return result
-
-
 def contents(out: Path) -> dict[str, bytes]:
     """Every file of a study, hidden ones included; of ``metrics.json`` without its times."""
     files = [path for path in out.rglob("*") if path.is_file()]
@@ -154,7 +143,7 @@ def kill_trainings(
             raise SystemExit(f"an undisturbed study failed: {run.told.read_text()}")
         seconds[mode] = time.monotonic() - begin
         made = contents(run.out)
-        yield f"undisturbed: {mode.name}", _differences(wanted or made, made)
+        yield f"undisturbed: {mode.name}", differences(wanted or made, made)
         wanted = wanted or made
     stops = [(number, of_group) for number in STOPS for of_group in (False, True)]
     kinds, modes, n_done = cycle(rng.sample(stops, len(stops))), cycle(MODES), 0
@@ -212,12 +201,12 @@ def _stopped(run: Study, number: signal.Signals, *, of_group: bool) -> list[str]
         return problems
     lines = run.told.read_text().splitlines()
     is_early = status in (-number, 1) and not run.out.exists()  # while Python starts
-    if not is_early and (status != STATUS[number] or not _is_one_line(lines, number)):
+    if not is_early and (status != STATUS[number] or not is_one_line(lines, number)):
         problems.append(f"{number.name}: status {status}, said {lines[-3:]}")
     return problems
 
 
-def _is_one_line(lines: list[str], number: signal.Signals) -> bool:
+def is_one_line(lines: list[str], number: signal.Signals) -> bool:
     """True where progress is followed by one line on the signal, and by nothing else."""
     said = [line for line in lines if not line.startswith("[")]
     return len(said) == 1 and said[0].startswith(f"diagnose: {SAID[number]}; ")
@@ -237,9 +226,10 @@ def _finished(place: Path, data: Path, wanted: dict[str, bytes]) -> list[str]:
             return ["resume of a complete study fails"]
     finally:
         os.chdir(here)
-    return _differences(wanted, contents(run.out))
+    return differences(wanted, contents(run.out))
 
 
-def _differences(wanted: dict[str, bytes], made: dict[str, bytes]) -> list[str]:
+def differences(wanted: dict[str, bytes], made: dict[str, bytes]) -> list[str]:
+    """Names of files that are not the same in two studies."""
     names = sorted({*wanted, *made})
     return [f"{name} differs" for name in names if wanted.get(name) != made.get(name)]

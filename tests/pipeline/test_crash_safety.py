@@ -9,13 +9,13 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from contextlib import contextmanager
 
 import pytest
 from small_sets import TINY, contents, make
 
 from benchmarks._kill_verbs import kill_verbs
+from benchmarks._process_groups import alive_in_group
 from benchmarks.kill_campaign import campaign, n_kills_of
 from gensig.cli import main
 from gensig.dataset.folder import beginning
@@ -67,17 +67,6 @@ def test_killed_at_random_moments_it_ends_byte_equal(tmp_path):
 def test_a_verb_killed_between_file_operations_is_finished_as_it_says(tmp_path, name):
     seed = time.time_ns()
     assert list(kill_verbs(1, seed, tmp_path, [name])) == [(name, [])], seed
-
-
-def alive_in_group(group):
-    """Commands of a process group that still run."""
-    result = []
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        with suppress(OSError):
-            state, _, own_group = path.read_text().rpartition(")")[2].split()[:3]
-            if int(own_group) == group and state != "Z":
-                result.append((path.parent / "cmdline").read_bytes().decode())
-    return result
 
 
 def heed_interrupts():

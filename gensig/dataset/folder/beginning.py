@@ -28,6 +28,7 @@ from gensig.dataset.schema import version_of
 from gensig.dataset.splitting.protocols import make_splits
 from gensig.dataset.storage.atomic import (
     TEMPORARY_SUFFIX,
+    at_work,
     cannot_write,
     locked,
     write_text,
@@ -121,7 +122,10 @@ def config_text(config: ConfigContent) -> str:
 
 
 def refuse_used(out: Path) -> None:
-    """Raise DatasetError where a folder holds anything but a beginning that was killed."""
+    """Raise DatasetError where a folder holds anything but a beginning that was killed.
+
+    The line says where another process is at work there.
+    """
     if out.is_dir():
         if any(out.iterdir()) and not _is_killed_beginning(out):
             raise DatasetError(f"{out} {_contents(out)}")
@@ -140,6 +144,8 @@ def _contents(out: Path) -> str:
             f"is not empty: a complete data set of {manifest.n_records} records; choose another "
             "out=DIR"
         )
+    with at_work(out / SHARDS, others=False):
+        pass  # else another process is making it, which the error says
     kind = "an interrupted" if manifest.n_done else "a planned"
     done = f"{manifest.n_made} of {manifest.n_records} records done"
     return (

@@ -6,9 +6,10 @@ import h5py
 import numpy as np
 
 from gensig.dataset.cards.facts import gear_facts, value_range
-from gensig.dataset.folder.layout import MANIFEST, Manifest, read_manifest
+from gensig.dataset.folder.layout import MANIFEST, SHARDS, Manifest, read_manifest
 from gensig.dataset.folder.quick_check import check_opening
 from gensig.dataset.reader import Dataset, open_dataset
+from gensig.dataset.storage.atomic import at_work
 from gensig.dataset.storage.attributes import HDF5_ERRORS, read_attributes
 from gensig.dataset.storage.guard import holds_its_data, open_file
 from gensig.errors import DatasetError
@@ -50,12 +51,21 @@ def _folder(folder: Path) -> str:
     lines = [f"{name}: data set, {version}, {manifest.state}"]
     if not manifest.is_complete:
         done = f"{manifest.n_made} of {manifest.n_records} records"
-        lines.append(f"  done         {done}; `gensig resume {name}` finishes it")
+        lines.append(f"  done         {done}; {_going_on(folder)}")
     lines += _manifest_lines(folder, manifest)
     if manifest.n_done:
         with open_dataset(folder, allow_incomplete=True) as data:
             lines += _dataset_lines(data)
     return "\n".join([*lines, ""])
+
+
+def _going_on(folder: Path) -> str:
+    """Words on who finishes a data set that is incomplete."""
+    try:
+        with at_work(folder / SHARDS, others=False):
+            return f"`gensig resume {_show(folder)}` finishes it"
+    except DatasetError:
+        return "another process is at work in it"
 
 
 def _manifest_lines(folder: Path, manifest: Manifest) -> list[str]:

@@ -84,6 +84,22 @@ def test_a_system_without_locks_locks_nothing(frozen, monkeypatch):
     assert verify(frozen).problems == []
 
 
+def test_a_folder_in_work_says_so_and_one_that_was_stopped_how_it_goes_on(
+    frozen, capsys
+):
+    again = ["generate", "--quiet", *TINY, f"out={frozen}"]
+    with at_work(frozen / SHARDS, others=False):
+        refused(capsys, frozen, *again)
+        assert main(["inspect", str(frozen)]) == 0
+        said = capsys.readouterr().out
+        assert "; another process is at work in it" in said
+        assert "gensig resume" not in said
+    assert main(again) == 2
+    assert f"`gensig resume {frozen}` finishes it" in capsys.readouterr().err
+    assert main(["inspect", str(frozen)]) == 0
+    assert f"`gensig resume {frozen}` finishes it" in capsys.readouterr().out
+
+
 def test_tasks_share_a_folder_that_nobody_closes_meanwhile(frozen, capsys):
     with at_work(frozen / SHARDS, others=True):
         assert main(["generate", "--quiet", *TASKS, f"out={frozen}"]) == 0

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
 import platform
+import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
+
+from benchmarks._process_groups import alive_in_group
+from diagnose.workers import call_all
+from gensig.errors import GensigError
 
 PAGE_FAULTS = """
 import resource, sys
@@ -47,7 +55,6 @@ from diagnose.workers import call_all
 from gensig.terminal.program import guarded
 
 def run():
-    print("begun", flush=True)
     call_all(time.sleep, (), (600, 600), n_workers=2, on_done=print, remedy="")
 
 if __name__ == "__main__":
@@ -55,21 +62,68 @@ if __name__ == "__main__":
 """
 
 
-def test_sigterm_waits_for_no_call(tmp_path) -> None:
-    """The signal reaches the parent alone, as from a batch system."""
+def heed_interrupts() -> None:
+    """Undo the disposition that a child of a background job inherits."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.mark.parametrize("of_group", [False, True])
+@pytest.mark.parametrize(
+    ("number", "status", "said_first"),
+    [
+        (signal.SIGINT, 130, "diagnose: interrupted; "),
+        (signal.SIGTERM, 143, "diagnose: stopped by SIGTERM; "),
+    ],
+)
+def test_a_signal_while_workers_start_is_one_line_and_leaves_none(
+    tmp_path, number, status, said_first, of_group
+) -> None:
+    """As from a terminal, which signals the group, and from a batch system, the parent."""
     script = tmp_path / "sleepers.py"
     script.write_text(SLEEPERS)
     process = subprocess.Popen(
         [sys.executable, str(script)],
-        stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        start_new_session=True,
+        preexec_fn=heed_interrupts,
     )
-    assert process.stdout is not None
-    assert process.stdout.readline() == "begun\n"
-    time.sleep(1.0)  # its workers are starting or asleep
-    process.terminate()
+    while sum("spawn_main" in words for words in alive_in_group(process.pid)) < 2:
+        assert process.poll() is None
+        time.sleep(0.005)
+    send = os.killpg if of_group else os.kill
+    send(process.pid, number)
     _, said = process.communicate(timeout=120)
-    assert process.returncode == 143
+    assert process.returncode == status
     (line,) = said.splitlines()
-    assert line.startswith("diagnose: stopped by SIGTERM; ")
+    assert line.startswith(said_first)
+    deadline = time.monotonic() + 60.0
+    while left := alive_in_group(process.pid):
+        assert time.monotonic() < deadline, left
+        time.sleep(0.05)
+
+
+def once_dead(notes: Path, number: int) -> int:
+    """The number; the process of number 1 dies as often as the folder of notes says."""
+    if number == 1 and len(list(notes.iterdir())) < 2:
+        (notes / f"{os.getpid()}").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def poisoned(number: int) -> int:
+    if number:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def test_a_call_whose_worker_was_killed_runs_again_and_an_error_says_so_in_the_end(
+    tmp_path,
+) -> None:
+    calls = {"n_workers": 2, "on_done": lambda *_: None, "remedy": "use fewer"}
+    assert call_all(once_dead, (tmp_path,), (0, 1, 2), **calls) == [0, 1, 2]
+    with pytest.raises(
+        GensigError, match=r"died 3 times \(out of memory\?\); use fewer"
+    ):
+        call_all(poisoned, (), (0, 1), **calls)
+    assert multiprocessing.active_children() == []
