@@ -178,7 +178,7 @@ def _sample(
     from diagnose.detectability.sampling import make_sampling, read_axes
     from diagnose.detectability.sampling_text import sampling_content, sampling_lines
     from diagnose.progress import progress
-    from diagnose.workers import n_cores
+    from gensig.execution.base import read_n_workers
     from gensig.options.compose import override_keys
 
     make = partial(
@@ -214,7 +214,7 @@ def _sample(
             axes,
             pairs_of,
             edges,
-            n_workers=arguments.workers or n_cores(),
+            n_workers=read_n_workers(arguments.workers),
             on_done=on_done,
         )
     show(*sampling_lines(sampling))

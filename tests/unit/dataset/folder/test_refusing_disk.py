@@ -102,10 +102,15 @@ def test_a_folder_that_another_process_makes_meanwhile_stays(tmp_path, monkeypat
             raise FileExistsError(path)
 
     monkeypatch.setattr(Path, "mkdir", overtaken)
-    with pytest.raises(RuntimeError), made_together.made_together() as made:
-        made.folder(folder)
-        assert folder.is_dir()
-        raise RuntimeError
+
+    def stopped():
+        with made_together.made_together() as made:
+            made.folder(folder)
+            assert folder.is_dir()
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        stopped()
     assert not folder.exists()
     assert folder.parent.is_dir()
 
