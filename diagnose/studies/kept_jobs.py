@@ -1,7 +1,8 @@
 """Outcomes of finished jobs on disk, from which a study that was stopped goes on.
 
-Each job has two files: arrays as ``.npz``, then a ``.json`` with the rest, the digests of both and
-that of everything an outcome depends on. Nothing else is read, and no pickle.
+Each job has two files: arrays as ``.npz``, then a ``.json`` with the rest and the digests of both.
+Their name is a digest of everything that an outcome depends on. Nothing else is read, and no
+pickle.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ class KeptJobs:
     kinds: tuple[type, ...]
 
     def name(self, job: Any) -> str:
-        """Name of the files of a job."""
+        """Name of the files of a job: a digest of it and of everything it depends on."""
         text = json.dumps([self.digest, asdict(job)], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
@@ -131,7 +132,7 @@ def keep_outcomes(kept: KeptJobs, job: Any, outcomes: Sequence[Any]) -> list[Any
     raw, path = buffer.getvalue(), kept.folder / kept.name(job)
     content = {
         "job": asdict(job),
-        "depends_on": kept.digest,
+        "name": path.name,
         "arrays": {"bytes": len(raw), DIGEST: hashlib.sha256(raw).hexdigest()},
         "outcomes": tree,
     }
@@ -154,7 +155,7 @@ def kept_outcomes(kept: KeptJobs, job: Any) -> list[Any] | None:
         raw = _bytes_of(path.with_suffix(".npz"), content["arrays"]["bytes"])
         is_whole = (
             content.pop(DIGEST) == content_digest(content)
-            and content["depends_on"] == kept.digest
+            and content["name"] == path.name
             and content["arrays"][DIGEST] == hashlib.sha256(raw).hexdigest()
         )
         if not is_whole:
