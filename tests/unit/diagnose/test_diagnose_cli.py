@@ -63,7 +63,7 @@ def test_train_writes_what_it_promises(trained, by_unit):
         "comparisons.csv confusion_by_unit.csv confusion_by_unit.png "
         "confusion_random_window_leaky.csv confusion_random_window_leaky.png "
         "metrics.json models predictions.csv reliability.png "
-        "report.html report.md scores.csv scores.png window_length.png"
+        "report.html report.md scores.csv scores.png study.json window_length.png"
     )
     metrics = metrics_of(trained)
     assert list(metrics["protocols"]) == ["by_unit", "random_window_leaky"]
