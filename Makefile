@@ -37,14 +37,17 @@ docs: $(VENV)/.installed-docs
 	@echo "Open build/site/index.html; with the search: $(BIN)/python -m http.server --directory build/site"
 
 $(VENV)/.installed: pyproject.toml constraints.txt | $(VENV)/bin/python
+	@echo "installing into $(VENV): some 2 GB with torch, minutes without a line"
 	$(BIN)/python -m pip install --quiet $(PIP_ARGS) --constraint constraints.txt --editable ".[diagnose,parquet]"
 	@touch $@
 
 $(VENV)/.installed-test: pyproject.toml constraints.txt | $(VENV)/bin/python
+	@echo "installing into $(VENV): some 3 GB with torch, minutes without a line"
 	$(BIN)/python -m pip install --quiet $(PIP_ARGS) --constraint constraints.txt --editable ".[test]"
 	@touch $@ $(VENV)/.installed
 
 $(VENV)/.installed-docs: pyproject.toml constraints.txt | $(VENV)/bin/python
+	@echo "installing into $(VENV): minutes without a line"
 	$(BIN)/python -m pip install --quiet $(PIP_ARGS) --constraint constraints.txt --editable ".[docs]"
 	@touch $@ $(VENV)/.installed
 

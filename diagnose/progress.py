@@ -19,6 +19,7 @@ def progress(n_steps: int, what: str = "training") -> Iterator[Callable[[str], N
         with _bar(n_steps, what) as advance:
             yield advance
         return
+    tell(f"[0/{n_steps}] {what}; each step tells a line when it is done")
     done = 0
 
     def write(line: str) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import sys
 from collections.abc import Sequence
+from functools import cache
 
 from gensig.commands.flags import OVERRIDES_HELP
 from gensig.commands.verbs import GROUPS, VERBS
@@ -76,6 +77,7 @@ def _run_verb(name: str, words: list[str]) -> int:
     module, function = verb.runs.split(":")
     is_quiet = getattr(arguments, "quiet", False)
 
+    @cache
     def on_compiling() -> None:
         if not is_quiet:
             step(COMPILING)

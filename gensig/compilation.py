@@ -1,23 +1,36 @@
-"""Compilation of kernels by Numba, which happens once on a machine and takes seconds."""
+"""Compilation of kernels by Numba, which happens once for a kind of machine and takes seconds."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 
-_waiting: list[Callable[[], None]] = []
+_watching: list[tuple[Callable[[], None], Callable[[float], None]]] = []
+
+
+def _ignore(_seconds: float) -> None:
+    """Take no notice of the end of a compilation."""
 
 
 @contextmanager
-def on_compilation(tell: Callable[[], None]) -> Iterator[None]:
-    """Call ``tell`` when the first kernel is compiled within the block, and not again."""
-    _waiting.append(tell)
+def on_compilation(
+    begun: Callable[[], None], ended: Callable[[float], None] = _ignore
+) -> Iterator[None]:
+    """Call functions at the begin and the end of every compilation within the block.
+
+    Parameters
+    ----------
+    begun : called before a kernel is compiled, with those that it calls
+    ended : called after it, with the seconds that it took
+    """
+    watch = begun, ended
+    _watching.append(watch)
     try:
         yield
     finally:
-        if tell in _waiting:
-            _waiting.remove(tell)
+        _watching.remove(watch)
 
 
 @cache
@@ -29,13 +42,23 @@ def watch() -> None:
     from numba.core import event
 
     class Listener(event.Listener):
+        depth = 0  # of kernels that are compiled for others
+        start = 0.0
+
         def on_start(self, event: object) -> None:
-            waiting = _waiting.copy()
-            _waiting.clear()
-            for tell in waiting:
-                tell()
+            self.depth += 1
+            if self.depth > 1:
+                return
+            self.start = time.monotonic()
+            for begun, _ in _watching.copy():
+                begun()
 
         def on_end(self, event: object) -> None:
-            pass
+            self.depth -= 1
+            if self.depth:
+                return
+            seconds = time.monotonic() - self.start
+            for _, ended in _watching.copy():
+                ended(seconds)
 
     event.register("numba:compile", Listener())

@@ -19,7 +19,7 @@ from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
 
 # A cold cache of kernels adds no line to what a command prints; test_progress has a process for it.
-gensig.compilation.on_compilation = lambda tell: nullcontext()
+gensig.compilation.on_compilation = lambda *told: nullcontext()
 
 # The first file compiles the integrator, which takes a minute; those of the networks, which
 # another process begins with, need none of it and find everything compiled afterwards. Then

@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 import functools
 import json
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -89,7 +89,7 @@ def write_shard(
         shard_index=shard_index,
     )
     together = block_length(config)
-    with writer, _compilation_told(counts):
+    with writer, _compilation_told(counts, shard_index):
         for first in range(0, n_records, together):
             rows = plan.records(begin + first, min(together, n_records - first))
             _check_rows(out, rows, shard_index, first)
@@ -104,10 +104,22 @@ def write_shard(
     return written
 
 
-def _compilation_told(counts: RecordCounts | None) -> AbstractContextManager[None]:
+@contextmanager
+def _compilation_told(counts: RecordCounts | None, shard: int) -> Iterator[None]:
+    """Begin the shard in the counts, and tell them of the compilations within the block."""
     if counts is None:
-        return nullcontext()
-    return on_compilation(counts.compiling)
+        yield
+        return
+    total = 0.0
+
+    def tell_end(seconds: float) -> None:
+        nonlocal total
+        total += seconds
+        counts.compiled(shard, total)
+
+    counts.begin(shard)
+    with on_compilation(lambda: counts.compiling(shard), tell_end):
+        yield
 
 
 @functools.lru_cache(maxsize=1)

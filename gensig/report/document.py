@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,7 @@ from gensig.report.signal_views import first_channel, opening_view, signal_views
 from gensig.report.values import (
     ALONG,
     INDICATORS,
+    MOST_MEASURED,
     MOST_ROWS,
     Measured,
     column_label,
@@ -60,7 +61,11 @@ PROGRAM = "gensig report"
 
 
 def write_report(
-    folder: Path, out: Path | None = None, *, per_class: int | None = None
+    folder: Path,
+    out: Path | None = None,
+    *,
+    per_class: int | None = None,
+    on_begin: Callable[[int], None] = lambda _: None,
 ) -> tuple[Path, str]:
     """Write the page of a complete data set; returns its path and a one-line summary.
 
@@ -70,6 +75,7 @@ def write_report(
     ----------
     out : file to write; None is `REPORT` in the folder
     per_class : records shown of each class; None lets the page's size decide
+    on_begin : called with the number of records that are measured, once all is in order
 
     Raises
     ------
@@ -91,7 +97,7 @@ def write_report(
     if per_class is not None and per_class < 1:
         raise ConfigError(f"--records {per_class} must be at least 1")
     with open_dataset(folder) as data:
-        text, summary = report_text(data, per_class)
+        text, summary = report_text(data, per_class, on_begin)
     content = text.encode("utf-8")
     if len(content) > MOST_BYTES:
         raise ConfigError(
@@ -102,10 +108,15 @@ def write_report(
     return path, f"{summary}, {len(content) / 1e6:.1f} MB"
 
 
-def report_text(data: Dataset, per_class: int | None) -> tuple[str, str]:
-    """The page, and a one-line summary."""
+def report_text(
+    data: Dataset,
+    per_class: int | None,
+    on_begin: Callable[[int], None] = lambda _: None,
+) -> tuple[str, str]:
+    """The page, and a one-line summary; see `write_report`."""
     chosen = choose(data, per_class)
     rotation = read_rotation(data)
+    on_begin(min(data.n_records, MOST_MEASURED))
     units = dict(zip(data.channel_names, tables.channel_units(data), strict=True))
     channel_units = [units[name] for name in chosen.channels]
     drawn = some_records(data, MOST_ROWS)

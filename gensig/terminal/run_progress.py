@@ -12,19 +12,29 @@ from gensig.terminal.printing import tell
 from gensig.text.amounts import duration_text, size_text
 
 LINE_SECONDS = 5.0
-COMPILING = "compiling, once on this machine: up to half a minute"
+COMPILING = "compiling, once for this kind of machine: up to a minute"
+STARTING = "workers start"
+LEAST_COMPILING = 1.0  # seconds of which a line is told
 
 
 class Counts(Protocol):
-    """Records of shards at work, and whether a worker compiles."""
+    """Records of shards at work, when the first was begun, and whether a worker compiles."""
 
     @property
     def n_made(self) -> int:
         """Records of all shards at work."""
 
     @property
+    def begun(self) -> float | None:
+        """Time of ``time.monotonic`` at which the first record was begun; None before."""
+
+    @property
     def is_compiling(self) -> bool:
-        """True from the first compilation on."""
+        """True while a worker compiles."""
+
+    @property
+    def compile_seconds(self) -> float:
+        """Seconds that the slowest worker has compiled."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,8 +75,7 @@ class RunProgress:
         self.counts = counts
         self._last: Progress | None = None
         self._begin = time.monotonic()
-        # time and number of records when the first of this run were seen: compiling is over
-        self._first: tuple[float, int] | None = None
+        self._compiling_is_told = False
         self._bar: Any = None
         self._ended = threading.Event()
         self._ticker = threading.Thread(target=self._tick, daemon=True)
@@ -148,22 +157,21 @@ class RunProgress:
         if self._bar is not None:
             self._bar.update(self._task, completed=self._n_done, facts=self.facts())
             return
+        self._tell_compiled()
         line = f"{self._n_done} of {self.n_records} records, {self.facts()}"
         if self._is_done:
             line += "; checksums, figures and card follow"
         tell(line)
 
     def facts(self) -> str:
-        """Rate, bytes and time left, as far as they are known."""
+        """Rate, bytes and time left, as far as they are known.
+
+        The rate is the mean since the first record was begun, so that compiling does not count.
+        """
         now, n_made = time.monotonic(), self._n_made
         if not n_made:
-            text = f"{now - self._begin:.0f} s"
-            if self.counts is not None and self.counts.is_compiling:
-                text += f"; {COMPILING}"
-            return text
-        if self._first is None:
-            self._first = now, n_made
-        rate = self._rate(now, n_made)
+            return f"{now - self._begin:.0f} s{self._before_the_first()}"
+        rate = n_made / max(now - self._begun(), 1e-3)
         n_left = self.n_records - self._n_done
         text = f"{rate:.1f} records/s"
         if self._last is not None and self._last.n_bytes:
@@ -174,12 +182,33 @@ class RunProgress:
             text += f", {self._last.n_failed} failed"
         return text
 
-    def _rate(self, now: float, n_made: int) -> float:
-        """Records a second since the first ones came, or since the beginning."""
-        begin, n_before = self._begin, 0
-        if self._first is not None and n_made > self._first[1]:
-            begin, n_before = self._first
-        return (n_made - n_before) / max(now - begin, 1e-3)
+    def _begun(self) -> float:
+        """Time at which the first record of this run was begun, as far as it is known."""
+        begun = None
+        if self.counts is not None:
+            begun = self.counts.begun
+        if begun is None:
+            return self._begin
+        return begun
+
+    def _before_the_first(self) -> str:
+        """Words on the step that the run is in before its first record is made."""
+        if self.counts is None:
+            return ""
+        if self.counts.is_compiling:
+            return f"; {COMPILING}"
+        if self.counts.begun is None:
+            return f"; {STARTING}"
+        return ""
+
+    def _tell_compiled(self) -> None:
+        """Say once how long the run compiled, when it no longer does."""
+        if self.counts is None or self._compiling_is_told or self.counts.is_compiling:
+            return
+        seconds = self.counts.compile_seconds
+        if seconds >= LEAST_COMPILING:
+            tell(f"compiled in {duration_text(seconds)}")
+            self._compiling_is_told = True
 
 
 def _is_interactive() -> bool:

@@ -10,7 +10,12 @@ from typing import TYPE_CHECKING
 
 from gensig.commands.console import note, step
 from gensig.commands.sets.jobs import Job, read_jobs, typed_words
-from gensig.commands.sets.running import print_failed, run
+from gensig.commands.sets.running import (
+    interruption_told,
+    print_failed,
+    resumed,
+    run,
+)
 from gensig.dataset.folder.beginning import config_text, refuse_used
 from gensig.dataset.folder.joining import joined_folder
 from gensig.dataset.folder.layout import MANIFEST, read_overrides
@@ -71,17 +76,18 @@ def _generate(
     begin = time.monotonic()
     table = begin_folder(request.config, request.overrides, out)
     n_records, n_shards = table.n_records, table.n_shards
-    if not arguments.quiet:
-        note(*request.notes, *plan_notes(request.config, table))
-        note(*plan_doubts(request.config, table))
-        step(f"{out}: making {n_records} records in {n_shards} shard(s)")
-    return run(
-        out,
-        executor,
-        arguments,
-        n_records=n_records,
-        begin=begin,
-    )
+    with interruption_told(out, resumed(out)):
+        if not arguments.quiet:
+            note(*request.notes, *plan_notes(request.config, table))
+            note(*plan_doubts(request.config, table))
+            step(f"{out}: making {n_records} records in {n_shards} shard(s)")
+        return run(
+            out,
+            executor,
+            arguments,
+            n_records=n_records,
+            begin=begin,
+        )
 
 
 def _generate_share(executor: Executor, arguments: Namespace) -> int:

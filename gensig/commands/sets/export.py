@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
+from gensig.commands.console import step
 from gensig.dataset.exports.export import HUGGING_FACE
 from gensig.dataset.exports.export import export as export_folder
 from gensig.report.document import write_report
@@ -37,6 +38,11 @@ def report(arguments: Namespace) -> int:
     out = None
     if arguments.out:
         out = Path(arguments.out).expanduser()
-    path, text = write_report(Path(arguments.folder), out, per_class=arguments.records)
+    path, text = write_report(
+        Path(arguments.folder),
+        out,
+        per_class=arguments.records,
+        on_begin=lambda n: step(f"{arguments.folder}: measuring {n} records"),
+    )
     show(f"{path}: {text}; open it in a browser")
     return 0

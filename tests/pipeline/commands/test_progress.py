@@ -26,7 +26,7 @@ from gensig.production.record_counts import RecordCounts, record_counts
 from gensig.production.shard_writing import write_shard
 from gensig.terminal import run_progress
 from gensig.terminal.interruptions import AGAIN
-from gensig.terminal.run_progress import COMPILING, Progress, RunProgress
+from gensig.terminal.run_progress import COMPILING, STARTING, Progress, RunProgress
 
 STATE = Progress(
     n_done=60, n_records=100, n_failed=2, n_made=40, n_bytes=8_000_000, reason=""
@@ -44,7 +44,9 @@ class FakeCounts:
     """Records of shards at work, as a test says."""
 
     n_made: int = 0
+    begun: float | None = None
     is_compiling: bool = False
+    compile_seconds: float = 0.0
 
 
 def quiet_progress(counts=None):
@@ -60,7 +62,8 @@ def test_lines_come_every_few_seconds_and_count_records_of_shards_at_work(
     with progress:
         time.sleep(0.12)
         before = capsys.readouterr().err.splitlines()
-        counts.n_made = 7
+        counts.is_compiling, counts.compile_seconds = False, 21.0
+        counts.n_made, counts.begun = 7, time.monotonic()
         time.sleep(0.12)
         at_work = capsys.readouterr().err.splitlines()
         counts.n_made = 0
@@ -69,28 +72,42 @@ def test_lines_come_every_few_seconds_and_count_records_of_shards_at_work(
     after = capsys.readouterr().err.splitlines()
     assert len(before) >= 2
     assert set(before) == {f"0 of 100 records, 0 s; {COMPILING}"}
+    assert at_work.pop(0) == "compiled in 21 s"
     assert len(at_work) >= 2
     assert all(re.match(r"7 of 100 records, [0-9.]+ records/s, ", x) for x in at_work)
-    running = r"60 of 100 records, [0-9.]+ records/s, 8 MB, 1 s left, 2 failed"
+    running = r"60 of 100 records, [0-9.]+ records/s, 8 MB, \d+ s left, 2 failed"
     assert len(after) >= 2
     assert all(re.fullmatch(running, line) for line in after)
 
 
 def test_rate_and_time_left_are_those_of_this_run():
-    """Records that existed before a resume were not made by this run, nor while it compiled."""
+    """The mean since its first record was begun: neither what was there, nor compiling counts."""
     counts = FakeCounts()
     progress = quiet_progress(counts)
     progress(replace(STATE, n_done=20, n_made=0, n_bytes=0, n_failed=0))
     progress._begin -= 30.0
-    assert progress.facts() == "30 s"
+    assert progress.facts() == f"30 s; {STARTING}"
+    counts.begun = time.monotonic() - 10.0
     counts.n_made = 10
-    assert progress.facts() == "0.3 records/s, 3 min 30 s left"
-    progress._first = progress._first[0] - 5.0, 10
+    assert progress.facts() == "1.0 records/s, 1 min 10 s left"
     counts.n_made = 34
-    assert progress.facts() == "4.8 records/s, 10 s left"
+    assert progress.facts() == "3.4 records/s, 14 s left"
     counts.n_made = 0
     progress(replace(STATE, n_done=70, n_made=50))
-    assert progress.facts() == "8.0 records/s, 8 MB, 4 s left, 2 failed"
+    assert progress.facts() == "5.0 records/s, 8 MB, 6 s left, 2 failed"
+
+
+def test_the_last_line_repeats_the_mean_of_the_run(capsys):
+    """Whatever was shown before it, and although records come in blocks."""
+    counts = FakeCounts(begun=time.monotonic() - 40.0)
+    progress = RunProgress(quiet=False, n_records=100, counts=counts)
+    for n_made in (0, 16, 32, 32, 96):
+        counts.n_made = n_made
+        progress.facts()
+    counts.n_made = 0
+    progress(replace(STATE, n_done=100, n_made=100, n_failed=0))
+    last = "100 of 100 records, 2.5 records/s, 8 MB; checksums, figures and card follow"
+    assert capsys.readouterr().err.splitlines() == [last]
 
 
 def test_without_counts_a_record_counts_with_its_shard():
@@ -102,12 +119,22 @@ def test_without_counts_a_record_counts_with_its_shard():
 
 def test_workers_tell_their_records_and_their_compiling():
     with record_counts(3) as counts:
-        assert (counts.n_made, counts.is_compiling) == (0, False)
+        assert (counts.n_made, counts.begun, counts.is_compiling) == (0, None, False)
         seen = pickle.loads(pickle.dumps(counts))
+        seen.begin(0)
+        seen.compiling(0)
+        assert (counts.begun, counts.is_compiling) == (None, True)
+        before = time.monotonic()
+        seen.compiled(0, 21.0)
+        assert before <= counts.begun <= time.monotonic()
+        assert (counts.is_compiling, counts.compile_seconds) == (False, 21.0)
+        begun = counts.begun
+        seen.begin(2)
         seen.set(0, 4)
         seen.set(2, 5)
-        seen.compiling()
-        assert (counts.n_made, counts.is_compiling) == (9, True)
+        seen.compiling(0)  # a kernel that only a later record needs
+        seen.compiled(0, 22.0)
+        assert (counts.n_made, counts.begun) == (9, begun)
         counts.set(0, 0)
         assert counts.n_made == 5
     seen.set(1, 3)  # a worker that outlives the run, or does not see the file
@@ -129,20 +156,20 @@ def test_records_are_counted_while_a_shard_is_made(tmp_path):
     assert seen == [(0, n) for n in range(1, 7)]
 
 
-def test_compiling_is_told_once(monkeypatch, tmp_path):
-    """In a process with an empty cache, for the first kernel only."""
+def test_every_compilation_is_told_and_a_kernel_within_another_is_a_part_of_it():
+    """In a process with an empty cache; what is compiled already is not compiled again."""
     code = (
         "import gensig.compilation as c, numba, sys; c.watch(); told = []\n"
-        "f = numba.njit(lambda x: x + 1); g = numba.njit(lambda x: x + 2)\n"
-        "with c.on_compilation(lambda: told.append(1)):\n"
-        "    f(1); f(1.0); g(1)\n"
+        "f = numba.njit(lambda x: x + 1); g = numba.njit(lambda x: f(x) + 2)\n"
+        "with c.on_compilation(lambda: told.append(0), told.append):\n"
+        "    g(1); g(1); f(1); f(1.0)\n"
         "f(1j)\n"
-        "print(len(told))"
+        "print([seconds > 0 for seconds in told])"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
-    assert done.stdout == "1\n"
+    assert done.stdout == f"{[False, True] * 2}\n"
 
 
 def test_a_terminal_shows_a_bar_with_rate_bytes_and_time_left(tmp_path):
