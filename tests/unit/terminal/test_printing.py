@@ -14,6 +14,7 @@ from gensig.commands.console import remark, step
 from gensig.dataset.folder.layout import LOG
 from gensig.dataset.folder.run_log import log
 from gensig.errors import ConfigError
+from gensig.terminal import run_progress
 from gensig.terminal.printing import show, show_text, tell, tell_text
 from gensig.terminal.program import guarded
 from gensig.terminal.warning_lines import one_line_warnings
@@ -84,10 +85,32 @@ def test_what_goes_to_stderr_is_one_line(act, capsys):
     assert SHOWN in printed or ON_ONE_LINE in printed
 
 
-def test_the_bar_shows_brackets_of_a_name_as_they_are(monkeypatch):
-    terminal = io.StringIO()
-    console = partial(Console, file=terminal, force_terminal=True, width=200)
+@pytest.fixture
+def terminal(monkeypatch):
+    """What is shown on a terminal."""
+    shown = io.StringIO()
+    console = partial(Console, file=shown, force_terminal=True, width=200)
     monkeypatch.setattr("rich.console.Console", lambda stderr: console())
+    monkeypatch.setattr(run_progress, "_is_interactive", lambda: True)
+    return shown
+
+
+def test_the_bar_of_a_run_counts_records_of_all(terminal):
+    with run_progress.RunProgress(quiet=False, n_records=8) as on_shard:
+        for n_done in (0, 3):
+            state = run_progress.Progress(
+                n_done=n_done,
+                n_records=8,
+                n_failed=0,
+                n_made=n_done,
+                n_bytes=100,
+                reason="",
+            )
+            on_shard(state)
+    assert "3/8" in terminal.getvalue()
+
+
+def test_the_bar_shows_brackets_of_a_name_as_they_are(terminal):
     with _bar(1, "training") as advance:
         advance("set [bold]a[/bold]")
     assert "set [bold]a[/bold]" in terminal.getvalue()

@@ -1,11 +1,13 @@
 """What a reader of a study sees first: scores on unknown machines, and pictures of teeth."""
 
+import numpy as np
 import pytest
 from runs import NETWORK_ONLY, QUICK, metrics_of, train
 from small_studies import two_channels
 
 from diagnose.recordings.found_faults import MOST_PICTURES, Answered, shown
 from diagnose.report.headlines import headline_protocol, headlines
+from diagnose.report.tooth_figure import AccusedTooth, tooth_figure
 
 
 def score(mean):
@@ -72,6 +74,30 @@ def test_pictures_lie_beside_the_report(tooth_study):
     for picture in pictures:
         assert picture.read_bytes().startswith(b"\x89PNG")
         assert f"]({picture.name})" in text
+
+
+def test_a_picture_marks_the_tooth_among_its_sisters_under_its_title(monkeypatch):
+    accused = AccusedTooth(
+        gear="wheel",
+        tooth=2,
+        channel="housing",
+        turn=np.arange(20.0).reshape(5, 4),
+        log_odds={"pinion": np.zeros(3), "wheel": np.arange(5.0)},
+    )
+    saved = []
+
+    def save(figure, _):
+        saved.append((figure.get_suptitle(), figure.axes))
+
+    monkeypatch.setattr("diagnose.report.tooth_figure.save", save)
+    tooth_figure("tooth.png", accused, "record 7")
+    ((title, (turn, passage, odds)),) = saved
+    assert title == "record 7"
+    assert turn.get_xlabel() == "teeth of the wheel, from the first in mesh"
+    *sisters, mine = (line.get_ydata() for line in passage.lines)
+    assert np.array_equal(mine, accused.turn[2])
+    assert np.array_equal(sisters, accused.turn[[0, 1, 3, 4]])
+    assert [len(line.get_ydata()) for line in odds.lines[:2]] == [3, 5]
 
 
 @pytest.mark.parametrize("page", ["report.md", "report.html"])

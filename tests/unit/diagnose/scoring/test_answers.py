@@ -1,5 +1,6 @@
 """Answers made of predictions: perfect and random ones, planted weaknesses, known thresholds."""
 
+import copy
 import dataclasses
 import itertools
 import json
@@ -334,6 +335,26 @@ def test_figures_show_conditions_severities_and_window_lengths(study, tmp_path, 
     axes.clear()
     window_length_figure(tmp_path / "c.png", {"by_unit": answers})
     assert any(axis.lines or axis.containers for axis in axes)
+
+
+def test_a_figure_marks_the_limits_of_severity_that_are_reached(study, tmp_path, axes):
+    answers = copy.deepcopy(protocol_answers(*study))
+    ends = {"low": None, "high": None, "largest_tested": 1.0}
+    rows = [
+        ("severity", "reached", 0.3),
+        ("severity", "not_reached", 0.4),
+        ("crack_depth_mm", "reached", 0.5),
+        ("crack_depth_mm", "not_reached", 0.6),
+    ]
+    limits = [
+        {"quantity": quantity, "status": status, "value": value, "share": 0.5, **ends}
+        for quantity, status, value in rows
+    ]
+    for part in answers["detection"][answers["network"]]["classes"].values():
+        part["limits"] = limits
+    detection_figure(tmp_path / "limits.png", answers)
+    texts = [text.get_text() for axis in axes for text in axis.texts]
+    assert {text for text in texts if " at " in text} == {"50% at 0.30"}
 
 
 def crack_of(study):
