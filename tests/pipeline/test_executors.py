@@ -152,7 +152,7 @@ def test_tasks_of_an_array_share_all_shards_out():
     ("section", "hint"),
     [
         ({"kind": "cloud"}, "local, dask, slurm"),
-        ({"kind": "local", "n_workers": 0}, "executor.n_workers"),
+        ({"kind": "local", "n_workers": 0}, "n_workers = 0 .* at least 1, or null$"),
         ({"kind": "dask", "n_workers": 1, "address": 3}, "executor.address"),
         (
             {"kind": "slurm", "n_workers": 1, "shard_index": None, "shard_count": 2},
@@ -164,7 +164,7 @@ def test_tasks_of_an_array_share_all_shards_out():
         ),
         (
             {"kind": "slurm", "n_workers": 1, "shard_index": -1, "shard_count": 2},
-            "at least 0",
+            "at least 0$",
         ),
     ],
 )

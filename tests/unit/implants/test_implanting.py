@@ -1,11 +1,13 @@
 """Laws of implants: what is added, at which level, and how it turns."""
 
-from dataclasses import replace
+import inspect
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from implant_samples import CARRIER_TEETH, KNOCK_HZ, carrier
 
+import gensig
 from gensig.implants.carriers import healthy_recording
 from gensig.implants.gearing import Gearing
 from gensig.implants.implanting import Implanter, implant_records
@@ -77,6 +79,25 @@ def test_gains_are_uniform_and_the_same_for_all_classes(pairs, healthy):
         assert max(gains) <= 6.0
         np.testing.assert_allclose(np.mean(gains), 1.0, atol=0.3)
         np.testing.assert_allclose(np.std(gains), 10.0 / 12**0.5, atol=0.2)
+
+
+def test_records_of_a_condition_and_class_are_counted_from_0(pairs, healthy):
+    columns = implanter(pairs, healthy).plan.table.columns
+    numbers = {}
+    keys = zip(columns["condition_id"], columns["label"], strict=True)
+    for key, number in zip(keys, columns["repeat"], strict=True):
+        numbers.setdefault(key, []).append(int(number))
+    assert len(numbers) > len(CLASSES)
+    for given in numbers.values():
+        assert given == list(range(len(given)))
+
+
+def test_python_has_the_defaults_of_the_command():
+    given = inspect.signature(gensig.implant).parameters
+    names = [field.name for field in fields(ImplantOptions) if field.name in given]
+    assert len(names) >= 7
+    for name in names:
+        assert given[name].default == getattr(ImplantOptions(), name), name
 
 
 def test_starts_gears_and_channels_tell_no_class(pairs, healthy):

@@ -145,6 +145,21 @@ def test_another_layout_is_one_line_with_what_is_there(name, tmp_path) -> None:
         load(name, tmp_path)
 
 
+@pytest.mark.parametrize("n_files", [1, 4, 5, 9])
+def test_of_many_other_files_four_are_named_and_the_rest_counted(
+    n_files, tmp_path
+) -> None:
+    names = [f"notes{index}.txt" for index in range(n_files)]
+    for name in names:
+        (tmp_path / name).write_text("nothing\n")
+    with pytest.raises(ConfigError) as caught:
+        load(sorted(MADE)[0], tmp_path)
+    told = ", ".join(names[:4])
+    if n_files > 4:
+        told += f" and {n_files - 4} more"
+    assert str(caught.value).endswith(f"it holds {told}")
+
+
 @pytest.mark.parametrize("name", sorted(MADE))
 def test_every_fact_has_a_source_or_a_reason(name) -> None:
     facts = shipped_facts(name)

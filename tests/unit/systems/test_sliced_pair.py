@@ -9,6 +9,7 @@ from refusals import refused
 
 from gensig.mesh.modification import FlankModification, PairModification
 from gensig.plan.request import read_request
+from gensig.systems import flank_optimum
 from gensig.systems.flank_optimum import (
     N_VARIABLES,
     Cases,
@@ -128,6 +129,22 @@ def test_a_short_search_beats_plain_flanks_and_repeats(helical):
     assert first == second
     assert len(first) == 1
     assert first[0].ripple < 0.95 * plain.ripple
+
+
+@pytest.mark.parametrize("generations", [1, 4])
+def test_the_generations_bound_the_work(helical, monkeypatch, generations):
+    judged = []
+
+    def of_relief(_, modification, *__, **___):
+        judged.append(modification)
+        ripple = 1.0 + 1e6 * modification.pinion.tip_relief
+        return Optimum(modification=modification, ripple=ripple, line_load=1.0)
+
+    monkeypatch.setattr(flank_optimum, "judge", of_relief)
+    optimise(helical, ALIGNED, n_front=1, seed=3, generations=generations)
+    of_each = flank_optimum.POPULATION * N_VARIABLES
+    assert len(judged) <= (generations + 1) * of_each + 2
+    assert len(judged) > 0.8 * generations * of_each
 
 
 def test_a_front_trades_ripple_for_load(helical):

@@ -14,9 +14,15 @@ from gensig.signals.mesh_motion import Teeth
 from gensig.signals.recording import Recording
 from gensig.signals.transfer.path_gain import gain_at, minimum_phase
 from gensig.twin.speed import find_motion
+from gensig.twin.writing import DEFAULT_OVERSAMPLING
 
 BOTH = Teeth(driving=TEETH[0], driven=TEETH[1])
 WRONG_START = 1.012 * SPEED
+
+
+def test_what_a_twin_leaves_out_of_its_options_is_the_default():
+    solver = read_request([]).config["solver"]
+    assert solver["oversampling"] == DEFAULT_OVERSAMPLING
 
 
 @pytest.fixture(scope="module")

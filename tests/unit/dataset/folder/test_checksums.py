@@ -10,6 +10,8 @@ import pytest
 from dataset_samples import build, make_plan
 
 from gensig.dataset.folder.closing import finalize
+from gensig.dataset.folder.manifest import read_manifest
+from gensig.dataset.folder.quick_check import absences
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.storage.checksums import accept_edits, read_checksums
 from gensig.errors import DatasetError
@@ -125,6 +127,16 @@ def test_nothing_else_is_accepted(with_log, name):
     with pytest.raises(DatasetError, match=r"may be edited|damaged|no JSON"):
         accept_edits(with_log)
     assert not verify(with_log).complete
+
+
+def test_an_edited_card_is_there_and_one_that_is_gone_is_not(with_log):
+    """What `gensig resume` looks at: a complete set with other words stays complete."""
+    manifest = read_manifest(with_log)
+    (with_log / "README.md").write_text("# Mine\n")
+    assert absences(with_log, manifest) == []
+    (with_log / "README.md").unlink()
+    (line,) = absences(with_log, manifest)
+    assert line.startswith("README.md is missing")
 
 
 def test_a_card_that_is_gone_is_not_accepted(with_log):

@@ -65,6 +65,16 @@ def test_the_first_found_fault_of_each_class_and_a_wrong_answer_are_shown():
     assert shown(many)[-1].truth == "crack"
 
 
+def test_the_version_of_the_metrics_is_that_of_their_keys(tooth_study):
+    """A reader finds these keys in version 1; others are another version."""
+    metrics = metrics_of(tooth_study)
+    assert metrics["metrics_schema_version"] == 1
+    assert {
+        *("data", "data_fingerprint", "n_records", "sampling_rate_hz"),
+        *("channel_names", "model", "settings", "environment", "protocols"),
+    } <= set(metrics)
+
+
 def test_pictures_lie_beside_the_report(tooth_study):
     pictures = sorted(tooth_study.glob("tooth_*.png"))
     assert 1 <= len(pictures) <= MOST_PICTURES

@@ -8,7 +8,9 @@ from refusals import refused
 from runs import model_of, refuses, says
 
 from diagnose.recordings.channels import tacho_apart
-from gensig.signals.recording import RecordingFile
+from diagnose.recordings.followed import tracked_if_long
+from diagnose.recordings.source import Source
+from gensig.signals.recording import Recording, RecordingFile
 
 RATE = 12800
 TEETH = (23, 84)
@@ -92,6 +94,22 @@ def test_the_channel_of_a_tacho_is_none_of_the_sensors():
         tacho_apart(alone, "pulses")
     with refused("no channel tacho; it has x, pulses, y"):
         tacho_apart(content, "tacho")
+
+
+@pytest.mark.parametrize("speed_rpm", [None, 1490.0, 1510.0, 1400.0, 1600.0])
+def test_a_stated_speed_must_be_that_of_the_tacho(speed_rpm):
+    time = np.arange(2 * RATE) / RATE
+    pulses = (np.mod(SPEED_RPM / 60 * time, 1.0) < 0.1).astype(float)
+    recording = Recording(
+        sensors=("x",), acceleration=gearing(2.0, n_channels=1), sampling_rate=RATE
+    )
+    source = Source(file="a", tacho="pulses", pulses_per_turn=1, speed_rpm=speed_rpm)
+    if speed_rpm in (1400.0, 1600.0):
+        with refused(f"gives 1500 r/min, --speed-rpm says {speed_rpm:g}"):
+            tracked_if_long(recording, pulses, source, inputs=None)
+    else:
+        tracked = tracked_if_long(recording, pulses, source, inputs=None)
+        assert tracked.speed_rpm == pytest.approx(SPEED_RPM, rel=1e-4)
 
 
 def test_a_recording_without_a_mesh_is_refused(ask, capsys):
