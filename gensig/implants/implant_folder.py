@@ -113,6 +113,8 @@ def write_implant_shard(
     n_rows, first = sizes[shard_index], sum(sizes[:shard_index])
     writer = _writer(out, implanter, shard_index, n_rows)
     with writer:
+        if counts is not None:
+            counts.begin(shard_index)
         for row in range(n_rows):
             signal = implanter.record(first + row)
             values = _values(implanter, first + row)

@@ -8,6 +8,8 @@ from docs_pages import ROOT, command_lines
 import diagnose.cli
 import gensig.cli
 from diagnose.commands.predict import OUT_OF_DISTRIBUTION
+from gensig.plan.make import make_plan
+from gensig.plan.request import read_request
 
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 MAIN = {"gensig": gensig.cli.main, "diagnose": diagnose.cli.main}
@@ -74,12 +76,20 @@ def test_the_two_commands_are_those_of_the_makefile():
     assert all(f"\n{target}:" in makefile for target in targets)
 
 
+def test_its_numbers_of_the_demo_are_those_of_its_plan():
+    told = re.findall(r"^make demo +# (\d+) records of (\d+) machines", TEXT, re.M)
+    plan = make_plan(read_request(["experiment=quickstart"]).config)
+    n_units = len(set(plan.columns["unit_id"]))
+    assert told == [(str(plan.n_records), str(n_units))]
+
+
 def test_its_installation_brings_what_its_commands_need():
     """`diagnose`, and the package of the formats that the line on exports names."""
     (formats,) = re.findall(r"gensig export .*# or (.*)", TEXT)
     assert {"hf", "parquet"} <= set(re.findall(r"\w+", formats))
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    (of_demo,) = re.findall(r"/\.installed: .*\n.* \"\.\[(.*)\]\"\n", makefile)
+    recipe = makefile.partition("/.installed:")[2].partition("\n\n")[0]
+    (of_demo,) = re.findall(r"\.\[(.*)\]", recipe)
     (of_readme,) = re.findall(r"Without `make`: `pip install '\.\[(.*)\]'`", TEXT)
     assert of_demo == of_readme == "diagnose,parquet"
 
