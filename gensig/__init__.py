@@ -72,7 +72,7 @@ def open_dataset(
 
 
 def load_system(*overrides: str, config_dir: str | Path | None = None) -> Machine:
-    """The sound machine that overrides describe, as the commands would build it.
+    """The healthy machine that overrides describe, as the commands would build it.
 
     For its faults see `load_faults`.
 

@@ -32,7 +32,7 @@ class IndicatorModel(ChosenModelBaseline):
         name="indicators",
         label="indicators",
         card_label="indicators",
-        meaning="logistic regression or gradient boosting (chosen on validation units) on RMS, "
+        meaning="logistic regression or gradient boosting (chosen on validation machines) on RMS, "
         "kurtosis, crest factor, FM4 and sideband ratio of every channel over the whole stretch "
         "of signal; it knows the speed and the tooth counts.",
     )

@@ -196,7 +196,7 @@ class MiniRocket(Baseline):
         label="MiniRocket",
         card_label="MiniRocket",
         meaning="ridge regression on the shares of positive values of fixed convolutions (Dempster "
-        "et al. 2021), mean over the windows; the penalty is chosen on validation units.",
+        "et al. 2021), mean over the windows; the penalty is chosen on validation machines.",
     )
     role = Role.RIVAL
     reads = ROCKET_INPUT

@@ -118,7 +118,7 @@ class OracleIndicators(ChosenModelBaseline):
         name="oracle_indicators",
         label="indicators",
         card_label=None,
-        meaning="logistic regression or gradient boosting (chosen on validation units) on "
+        meaning="logistic regression or gradient boosting (chosen on validation machines) on "
         "indicators and band levels of the record, its healthy twin and their difference.",
     )
     role = Role.BOUND

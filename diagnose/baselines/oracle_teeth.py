@@ -131,7 +131,7 @@ class OracleTeeth(ChosenModelBaseline):
         name="oracle_teeth",
         label="teeth",
         card_label=None,
-        meaning="logistic regression or gradient boosting (chosen on validation units) on the "
+        meaning="logistic regression or gradient boosting (chosen on validation machines) on the "
         "difference of record and healthy twin tooth by tooth: its levels in bands and places of "
         "the passage at the tooth where it is largest, above the median tooth.",
     )

@@ -178,7 +178,7 @@ class MetadataProbe(_Probe):
         label="metadata probe",
         card_label="metadata",
         meaning="gradient boosting on what row and place of a record tell without its signal: set "
-        "speed and torque, noise, unit, start, order in the file. Above chance: something leaks.",
+        "speed and torque, noise, machine, start, order in the file. Above chance something leaks.",
     )
     role = Role.AT_CHANCE
     reads = METADATA_INPUT

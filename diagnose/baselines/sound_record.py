@@ -1,4 +1,4 @@
-"""Changes of teeth against a sound record of the same machine, band by band.
+"""Changes of teeth against a healthy record of the same machine, band by band.
 
 The model needs a history, which a monitored machine has and a new one lacks.
 ``docs/howto/engine_faults.md``.
@@ -37,7 +37,7 @@ Levels = dict[Key, dict[str, FloatArray]]
 
 
 def chosen_references(task: Task) -> IntArray:
-    """(record,) the sound record that each is compared with, by one rule for all classes.
+    """(record,) the healthy record that each is compared with, by one rule for all classes.
 
     It is one at another condition of the same unit. Data sets with one condition a unit give the
     next repeat at the same condition; see `diagnose.data.references.references`.
@@ -64,7 +64,7 @@ def chosen_references(task: Task) -> IntArray:
 def sound_record_table(task: Task, segments: Segments, known: Levels) -> FeatureTable:
     """Changes of the teeth of both gears, stretch by stretch, with the columns `_names`.
 
-    The reference is the whole sound record, also for a stretch that is part of a record.
+    The reference is the whole healthy record, also for a stretch that is part of a record.
     ``known`` is filled and used.
 
     Raises
@@ -74,7 +74,7 @@ def sound_record_table(task: Task, segments: Segments, known: Levels) -> Feature
     reference = chosen_references(task)
     if (reference[segments.record] < 0).all():
         raise ConfigError(
-            "baseline sound_record: no record of a part has a sound record to compare with; "
+            "baseline sound_record: no record of a part has a healthy record to compare with; "
             "leave that baseline out"
         )
     names = _names(task)
@@ -110,14 +110,14 @@ TOOTH_INPUT = Input(name="tooth_changes", make=sound_record_tables)
 
 @final
 class SoundRecord(ChosenModelBaseline):
-    """Logistic regression or gradient boosting on changes of teeth against a sound record."""
+    """Logistic regression or gradient boosting on changes of teeth against a healthy record."""
 
     text = MethodText(
         name="sound_record",
-        label="against a sound record",
+        label="against a healthy record",
         card_label=None,
-        meaning="logistic regression or gradient boosting (chosen on validation units) on which "
-        "tooth is louder or quieter than in a sound record of the same machine at another "
+        meaning="logistic regression or gradient boosting (chosen on validation machines) on which "
+        "tooth is louder or quieter than in a healthy record of the same machine at another "
         "condition (at the same one where the data set has one a machine); it is given that "
         "record, which the others are not.",
     )

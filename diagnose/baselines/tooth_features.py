@@ -1,7 +1,7 @@
 """Teeth that their sisters do not explain, as features of a stretch of signal.
 
-Errors of sound teeth differ in size and little in shape: pitch and profile errors excite a machine
-in few ways. A damaged tooth excites it in another way.
+Errors of healthy teeth differ in size and little in shape: pitch and profile errors excite a
+machine in few ways. A damaged tooth excites it in another way.
 """
 
 from __future__ import annotations

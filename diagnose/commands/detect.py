@@ -42,14 +42,14 @@ def add_arguments(parser: ArgumentParser) -> None:
         metavar="FILE",
         nargs="+",
         required=True,
-        help="of the same machine when sound, best of several sessions",
+        help="of the same machine when healthy, best of several sessions",
     )
     parser.add_argument(
         "--mounting",
         metavar="FILE",
         nargs="+",
         default=[],
-        help="sound too, each after the sensor was taken off and mounted again",
+        help="healthy too, each after the sensor was taken off and mounted again",
     )
     parser.add_argument(
         "--teeth",

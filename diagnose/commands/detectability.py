@@ -20,7 +20,7 @@ Which test shows the fault? Maps over speed, torque, channel and bandwidth, with
 Machines of the same build are simulated with and without the selected fault, everything as
 configured. One observer knows what the fault adds and the spectrum of the noise (physically
 there). The other knows indicators of other machines (seen). Both answer with d', the distance of
-sound and faulty records in standard deviations.
+healthy and faulty records in standard deviations.
 
 OVERRIDES are those of gensig: fault=crack fault.crack_depth_mm=1 sensing=housing. The control is
 plan.sham=true.

@@ -92,7 +92,7 @@ def _add_healthy(parser: ArgumentParser) -> None:
         metavar="FILE",
         nargs="+",
         default=[],
-        help="of the same machine when sound, for models with_reference",
+        help="of the same machine when healthy, for models with_reference",
     )
     add_healthy_speed(parser)
 

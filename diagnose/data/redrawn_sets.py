@@ -1,4 +1,4 @@
-"""Stored records as those of machines drawn anew, with the sound records of the same machine."""
+"""Stored records as those of machines drawn anew, with the healthy records of the same machine."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MACHINE, RECORD = 1, 2
 class RedrawnTurns:
     """Turns of stored records in machines drawn anew.
 
-    Draw k of a record and of the sound records that it is compared with is in the same machine,
+    Draw k of a record and of the healthy records that it is compared with is in the same machine,
     which all records of the unit share. Same data set, same draws.
 
     Parameters
@@ -77,7 +77,7 @@ class RedrawnTurns:
     ) -> list[list[tuple[GearTurns, float]]]:
         """Turns and mesh frequency in Hz of each re-draw of a record.
 
-        Those of the sound records that it is compared with follow in each.
+        Those of the healthy records that it is compared with follow in each.
         """
         result = []
         for draw in range(self._number):
@@ -109,7 +109,7 @@ class RedrawnTurns:
         return self._ranges.machine(n_sources, self._n_sensors, rng)
 
     def _separated(self, record: int) -> tuple[GearTurns, GearTurns | None]:
-        """Turns of the healthy twin, and of what the fault adds; None for a sound record."""
+        """Turns of the healthy twin, and of what the fault adds; None for a healthy record."""
         twin = self._separate(record, TWIN)
         if self._is_sound[record]:
             return twin, None

@@ -2,7 +2,7 @@
 
 A record at the bearings is its healthy twin, the carrier, and what the fault adds, the residual. A
 re-draw is carrier plus gain times residual through another housing, with other noise and tones of
-other parts. Housing and tones are those of a machine, the same for a record and the sound records
+other parts. Housing and tones are those of a machine, the same for a record and the healthy records
 that it is compared with; noise and gain are those of a record. All laws are the same for every
 class, so that a re-draw tells none. Domain randomisation: Tobin et al. (2017), IROS.
 
@@ -169,7 +169,7 @@ class RedrawnMachine:
         Parameters
         ----------
         carrier : at the bearings, (source, sample) m/s2, without the fault
-        residual : what the fault adds; None for a sound record. Its gain is drawn all the same
+        residual : what the fault adds; None for a healthy record. Its gain is drawn all the same
         mesh_frequency : Hz
         sampling_rate : Hz; there is neither signal nor noise above half of it
         n_samples : of the record, over which noise is averaged

@@ -1,4 +1,4 @@
-"""Sound records of the same machine that records are compared with, chosen alike for all classes.
+"""Healthy records of the same machine that records are compared with, chosen alike for all classes.
 
 A rule that depends on the class tells the class, whatever the signal holds.
 """
@@ -21,9 +21,9 @@ NONE = -1
 class ReferenceKind(Enum):
     """Choice of references; the value is what a data set must have for it."""
 
-    OTHER_CONDITION = "sound records at two conditions (plan.n_reference=1)"
-    SAME_CONDITION = "a second sound record at each condition (plan.n_repeats=2)"
-    EVERY_CONDITION = "sound records at further conditions (plan.n_reference=2)"
+    OTHER_CONDITION = "healthy records at two conditions (plan.n_reference=1)"
+    SAME_CONDITION = "a second healthy record at each condition (plan.n_repeats=2)"
+    EVERY_CONDITION = "healthy records at further conditions (plan.n_reference=2)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +48,7 @@ class _Records:
 
 
 def references(task: Task, kind: ReferenceKind) -> IntArray:
-    """(record,) a sound record of the same unit, by one rule for all classes.
+    """(record,) a healthy record of the same machine, by one rule for all classes.
 
     OTHER_CONDITION is the one at another condition that is nearest in set speed; the records of a
     condition have the same one. SAME_CONDITION is the next repeat at the same condition, so that
@@ -82,9 +82,9 @@ def references(task: Task, kind: ReferenceKind) -> IntArray:
 
 
 def all_references(task: Task, kind: ReferenceKind) -> tuple[tuple[int, ...], ...]:
-    """Sound records of the same unit for each record; none for one without a reference.
+    """Healthy records of the same machine for each record; none for one without a reference.
 
-    For EVERY_CONDITION all sound records at other conditions than the record's, the nearest in
+    For EVERY_CONDITION all healthy records at other conditions than the record's, the nearest in
     set speed first; else that of `references` alone.
 
     Raises
@@ -112,7 +112,7 @@ def _records(task: Task) -> _Records:
     dataset = task.dataset
     if missing := [name for name in NEEDED if name not in dataset.column_names]:
         raise ConfigError(
-            f"the data set does not say {missing[0]}, by which the sound record of a machine is "
+            f"the data set does not say {missing[0]}, by which the healthy record of a machine is "
             "chosen"
         )
     usable = np.asarray(dataset.usable, dtype=bool)

@@ -40,7 +40,7 @@ def record_targets(dataset: Dataset, record: IntArray) -> dict[str, NDArray[Any]
 
     Returns
     -------
-    severity : (window,) from 0 to 1, NaN for a sound record
+    severity : (window,) from 0 to 1, NaN for a healthy record
     gear : (window,) index in `diagnose.data.targets.GEARS`; faults of the further gears of a
         drive line are on none of them
     """
@@ -145,7 +145,7 @@ def position_loss(
 
     The label of a record means that some tooth of a gear is bad. A simulated record also names
     it. Without that a network has to find by itself which of all teeth made the label, and
-    learns the sound teeth of its training gears by heart.
+    learns the healthy teeth of its training gears by heart.
 
     Parameters
     ----------

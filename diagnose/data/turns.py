@@ -317,13 +317,13 @@ class Turns(NetworkInput):
     ) -> NDArray[np.float32]:
         """Turns of both gears and the mean passage of a recording, one after the other.
 
-        Those of what no other tooth explains, and of what sound recordings do not explain, follow
+        Those of what no other tooth explains, and of what healthy recordings do not explain, follow
         where the input has them.
 
         Parameters
         ----------
         turns : of the recording
-        sound : of sound recordings of the same machine, see
+        sound : of healthy recordings of the same machine, see
             `gensig.signals.alignment.changed_turns`
 
         Returns
@@ -365,11 +365,11 @@ class Turns(NetworkInput):
     def inputs_of(
         self, compared: Sequence[Steady], sampling_rate: float
     ) -> list[tuple[GearTurns, list[GearTurns]]]:
-        """Turns and those of sound recordings, for every input of a recording.
+        """Turns and those of healthy recordings, for every input of a recording.
 
         Parameters
         ----------
-        compared : the recording, and the sound ones of its machine
+        compared : the recording, and the healthy ones of its machine
         sampling_rate : Hz
         """
         turns, *sound = [each.turns for each in compared]
@@ -407,7 +407,7 @@ class Turns(NetworkInput):
         def of_record(record: int) -> list[Steady]:
             if not chosen[record]:
                 raise ConfigError(
-                    f"record {record} has no sound record of its machine to compare with: "
+                    f"record {record} has no healthy record of its machine to compare with: "
                     "make the data set with plan.n_reference=1, or leave reference=none"
                 )
             return [turns(other) for other in chosen[record]]

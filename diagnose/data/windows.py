@@ -25,7 +25,7 @@ REFERENCES = "references"  # reference records of the machines of the validation
 NORMALISATIONS = ("rms", "none")
 HEALTHY = "healthy"  # name of the class without a fault
 CROSS_SENSOR = "cross_sensor"  # the units of by_unit, tested on other channels
-IS_REFERENCE = "is_reference"  # 1: an extra sound record, neither example nor scored
+IS_REFERENCE = "is_reference"  # 1: an extra healthy record, neither example nor scored
 ROUNDING = 1e-6  # of a sample
 
 

@@ -213,7 +213,7 @@ def confirm_best(maps: Maps, others: Pairs) -> Seen:
 def _indicator_tables(
     pairs: Pairs, cell: PairCell, bandwidths: Sequence[float]
 ) -> tuple[FloatArray, FloatArray]:
-    """Indicators of the sound and of the faulty records, (unit, channel, band, indicator) each."""
+    """Indicators of healthy and of faulty records, (unit, channel, band, indicator) each."""
     n_indicators = len(indicator_names(list(pairs.gears)))
     shape = (pairs.n_units, len(pairs.channel_names), len(bandwidths), n_indicators)
     sound, faulty = np.full(shape, np.nan), np.full(shape, np.nan)

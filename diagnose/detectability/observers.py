@@ -1,7 +1,7 @@
 """Two observers of the same fault: one knows what it adds, one knows indicators of machines.
 
-Both answer with d', the distance of sound and faulty records in standard deviations. A share
-Phi(d' / sqrt(2)) of pairs of a sound and a faulty record is then ranked right.
+Both answer with d', the distance of healthy and faulty records in standard deviations. A share
+Phi(d' / sqrt(2)) of pairs of a healthy and a faulty record is then ranked right.
 """
 
 from __future__ import annotations
@@ -217,7 +217,7 @@ NOTHING_SEEN = Seen(
 def seen_by_indicators(sound: FloatArray, faulty: FloatArray) -> Seen:
     """Score of the indicator that is best on all machines but one, judged on that one, in turn.
 
-    A machine's score is its distance from the mean of the sound ones, in their standard
+    A machine's score is its distance from the mean of the healthy ones, in their standard
     deviations, in the direction in which the faulty ones of the others lie. Scores of indicators
     chosen for different machines are then on one scale.
 

@@ -61,7 +61,7 @@ def aligned(turn: FloatArray, to: FloatArray) -> FloatArray:
 def turn_change(
     turn: FloatArray, sound: Sequence[FloatArray], n_teeth: int
 ) -> TurnChange:
-    """Change of a turn against sound ones.
+    """Change of a turn against healthy ones.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def turn_change(
 
     Notes
     -----
-    Sound turns predict the turn through any smooth transfer
+    Healthy turns predict the turn through any smooth transfer
     (`gensig.signals.alignment.changed_turn`), so that another mounting explains nothing.
     """
     rest = changed_turn(turn, sound, turn.shape[-1] / n_teeth)
@@ -100,12 +100,12 @@ def tooth_features(to: Layout) -> tuple[Feature, ...]:
 def tooth_values(
     turns: Sequence[FloatArray], sound: Sequence[Sequence[FloatArray]], to: Layout
 ) -> FloatArray:
-    """(feature,) of the turns of all shafts against those of sound recordings.
+    """(feature,) of the turns of all shafts against those of healthy recordings.
 
     Parameters
     ----------
     turns : for each shaft (channel, sample)
-    sound : for each shaft its sound turns, rotated to that turn
+    sound : for each shaft its healthy turns, rotated to that turn
     """
     values = []
     for shaft, (turn, others) in enumerate(zip(turns, sound, strict=True)):

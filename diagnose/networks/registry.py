@@ -104,7 +104,7 @@ def has_window_length(config: Section) -> bool:
 
 
 def takes_reference(config: Section) -> bool:
-    """True if the network of a configuration can compare with a sound record of the machine.
+    """True if the network of a configuration can compare with a healthy record of the machine.
 
     Raises
     ------

@@ -34,7 +34,7 @@ class ToothNetwork(SiteNetwork):
     are turned so that each begins with the entry of a tooth, which is estimated from the mean
     passage. The same filters run around both gears. Their responses at a tooth are standardised
     against those of the other teeth at the same place of the passage, before and after the second
-    convolution. Sound teeth differ among each other, and a faulty tooth differs from them in
+    convolution. Healthy teeth differ among each other, and a faulty tooth differs from them in
     another way. The score of a class for the record is the log-sum-exp of its scores at all
     sites.
 
@@ -54,7 +54,7 @@ class ToothNetwork(SiteNetwork):
     level_samples : samples over which a response is squared and averaged, odd; the logarithms of
         these levels are further maps of the first convolution. 0: no such maps
     unexplained : True if the turns of what no other tooth explains follow in the input
-    reference : ``"none"``, or another word where what a sound record does not explain follows
+    reference : ``"none"``, or another word where what a healthy record does not explain follows
     """
 
     about: torch.Tensor

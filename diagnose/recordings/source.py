@@ -25,7 +25,7 @@ class Source:
     channels : names in the file, in the order of the network's
     unit : m/s2 or g
     array : name in a .npz, HDF5 or MATLAB file
-    healthy : recordings of the same machine when it was sound, described in the same way
+    healthy : recordings of the same machine when it was healthy, described in the same way
     torque_nm : N m of the driving shaft, for remaining lives
     life_time_h : h since the machine was new, for remaining lives with the age
     held_out : True to score only what was held out of a recording that carried implants

@@ -192,7 +192,7 @@ class StoredClassifier(StoredNetwork):
     def lines(self, result: Content) -> list[str]:
         """Part, channels, both scores and the recall of each class."""
         lines = [
-            f"{result['n_records']} records of {result['n_units']} unit(s): {result['part']}",
+            f"{result['n_records']} records of {result['n_units']} machine(s): {result['part']}",
             f"channels {', '.join(result['channel_names'])}",
         ]
         for name in ("balanced_accuracy", "macro_f1"):

@@ -1,4 +1,4 @@
-"""First figures of a study: an unknown machine, without and with a sound record of its own."""
+"""First figures of a study: an unknown machine, without and with a healthy record of its own."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ def headlines(metrics: Content) -> list[str]:
     lines = [f"{UNKNOWN_MACHINE}: balanced accuracy {network}, {chance}"]
     if failed := failed_controls(result, REFERENCE_TEXT.name):
         lines.append(
-            f"{UNKNOWN_MACHINE} with a sound record: no score, a control failed: {failed}"
+            f"{UNKNOWN_MACHINE} with a healthy record: no score, a control failed: {failed}"
         )
     elif REFERENCE_TEXT.name in methods:
         score = interval_text(methods[REFERENCE_TEXT.name]["balanced_accuracy"])
         condition = CONDITIONS[metrics["settings"]["reference"]]
         lines.append(
-            f"{UNKNOWN_MACHINE} with one sound record of its own {condition}: "
+            f"{UNKNOWN_MACHINE} with one healthy record of its own {condition}: "
             f"balanced accuracy {score}, {chance}"
         )
     return lines

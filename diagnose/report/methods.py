@@ -26,9 +26,9 @@ LEVEL_TEXT = MethodText(
 )
 REFERENCE_TEXT = MethodText(
     name=WITH_REFERENCE,
-    label="network with a sound record",
-    card_label="with a sound record",
-    meaning="the same network that also sees the turns of a sound record of the same machine; "
+    label="network with a healthy record",
+    card_label="with a healthy record",
+    meaning="the same network that also sees the turns of a healthy record of the same machine; "
     "which one, no class decides.",
 )
 ORACLE_TEXT = MethodText(
@@ -58,7 +58,7 @@ SHAM_NOTE = (
     "something other than the fault tells the class."
 )
 ORACLE_NOTE = (
-    "the best, on validation units, of the same network and of models on indicators and on teeth, "
+    "the best, on validation machines, of the same network and of models on indicators and teeth, "
     "all given the record's healthy twin in as much noise. What it finds is in the signal; it is a "
     "reference for those who do not know how this machine sounds when healthy, as far as these "
     "can learn, not a bound of what any detector could find."

@@ -17,9 +17,9 @@ QUESTIONS = {
 HEADS = {"auroc": "AUROC", "fpr95": "FPR95", "false_alarms": "false alarms"}
 MEANINGS = {
     "AUROC": "how often a new record has a larger score than a known one; chance is 0.50.",
-    "Found": "share of records above a threshold set on validation units for "
+    "Found": "share of records above a threshold set on validation machines for "
     f"{FALSE_ALARMS:.0%} false alarms.",
-    "False alarms": "share of the known records of the test units above it; where it is larger "
+    "False alarms": "share of the known records of the test machines above it; where it is larger "
     "than meant, what is found flatters.",
     "Band levels": "the flag of diagnose predict. It and the networks see windows as the "
     "classifier does.",
@@ -73,7 +73,7 @@ def _parts_sentence(result: Content) -> str:
     counts, units = result["n_records"], result["n_units"]
     return (
         f"Trained on {counts['train']} records ({', '.join(result['known_classes'])}) "
-        f"of {units['train']} units, "
+        f"of {units['train']} machines, "
         f"threshold from {counts['validation']} of {units['validation']}, "
         f"tested on {counts['test']} of {units['test']}; "
         f"new there: {', '.join(result['novel_classes'])}. "

@@ -279,11 +279,11 @@ def _trust_section(folder: Path, clean: Content) -> Section:
     return Section(
         title="What its probabilities are worth",
         text=[
-            "One temperature a network, fitted on the records of its validation units, brings the "
+            "One temperature a network, fitted on records of its validation machines, brings the "
             "probabilities of records nearer to the share that is right; it changes no label. "
             "Calibration error: mean distance between the two over test records, and what such "
             "probabilities would have by chance if they were all true. Cross-entropy: smaller is "
-            "better. The network is the one of its best epoch on validation units; the score of "
+            "better. The network is the one of its best epoch on validation machines; the score of "
             "its last epoch is shown for comparison."
         ],
         table=trust_table(clean),

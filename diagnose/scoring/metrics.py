@@ -158,7 +158,7 @@ def ratio_with_interval(
     rng: np.random.Generator,
     machines: Machines | None = None,
 ) -> dict[str, float | str | None]:
-    """Ratio of a score to that of a reference on the same units, with a 95 % interval.
+    """Ratio of a score to that of a reference on the same machines, with a 95 % interval.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ from diagnose.workers import call_all
 
 # Controls of a job beside the label shuffle, and the network that sees the level.
 PROBE, ORACLE, SHAM, LEVEL_KEPT = "probe", "oracle", "sham", "level_kept"
-# The network that also sees a sound record of the machine.
+# The network that also sees a healthy record of the machine.
 WITH_REFERENCE = "with_reference"
 WINDOWS = Windows()
 # Names of trained controls in metrics.json; those of `SHAM` and `LEVEL_KEPT` are the same.
@@ -249,7 +249,7 @@ def _with_further_answers(
 
 
 def with_reference(settings: TrainSettings) -> TrainSettings:
-    """Settings of the network that also sees a sound record of the machine."""
+    """Settings of the network that also sees a healthy record of the machine."""
     return replace(settings, model=settings.model | {REFERENCE: settings.reference})
 
 

@@ -46,7 +46,7 @@ def settings_for(
         return settings, note
     if asked_for != AUTO:
         raise ConfigError(
-            f"reference={asked_for}: network {network_name(settings)} compares with no sound "
+            f"reference={asked_for}: network {network_name(settings)} compares with no healthy "
             "record; model=tooth does"
         )
     return replace(settings, reference=NO_REFERENCE), note

@@ -41,7 +41,7 @@ from diagnose.training.entries import entry_scores
 from diagnose.training.heads import head_scores
 
 BOOTSTRAP_SEED = 20240607
-FAULT_GEAR = "fault_gear"  # column; "" for sound records
+FAULT_GEAR = "fault_gear"  # column; "" for healthy records
 ACCURACY = "balanced_accuracy"
 Pairs = Sequence[tuple[NDArray[np.integer], NDArray[np.integer]]]
 
@@ -195,7 +195,7 @@ def _entry(task: Task, settings: TrainSettings, network: Sequence[Prediction]) -
 def _by_gear(
     task: Task, settings: TrainSettings, network: Sequence[Prediction]
 ) -> dict[str, Entry]:
-    """Balanced accuracy of the sound records and the faults of one gear, for each gear.
+    """Balanced accuracy of the healthy records and the faults of one gear, for each gear.
 
     Empty where the faults of the test records are on one gear.
     """

@@ -186,9 +186,9 @@ def heads_notes(clean: Mapping[str, Any]) -> list[tuple[str, str]]:
     for name, result in clean.items():
         phrases = []
         for kind, row in result["heads"].get("severity_mae", {}).items():
-            phrase = f"severity of {kind} off by {interval_text(row, '.3f')}"
+            phrase = f"mean error of the severity of {kind} {interval_text(row, '.3f')}"
             if row["constant"] is not None:
-                phrase += f", by {row['constant']:.3f} if its usual one is said of all"
+                phrase += f" (the training median for all: {row['constant']:.3f})"
             phrases.append(phrase)
         if "faulted_gear" in result["heads"]:
             gear = result["heads"]["faulted_gear"]

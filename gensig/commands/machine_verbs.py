@@ -222,7 +222,7 @@ MACHINE_VERBS = {
         instead={"plan": "", "executor": "", "life": "", **FILES_INSTEAD},
     ),
     "stiffness": Verb(
-        summary="mesh stiffness of sound and faulty teeth",
+        summary="mesh stiffness of healthy and faulty teeth",
         examples=(
             "gensig stiffness fault=crack fault.crack_depth_mm=1.5"
             " --json crack.json --plot crack.png",

@@ -111,8 +111,8 @@ def span(values: NDArray[np.float64], form: str) -> str:
 
 
 def highest(sound: NDArray[np.float64], faulty: NDArray[np.float64] | None) -> str:
-    """Highest stiffness of a tooth pair, sound and faulty."""
+    """Highest stiffness of a tooth pair, healthy and faulty."""
     text = f"{sound.max():.4e} N/m"
     if faulty is not None:
-        text += f" sound, {faulty.max():.4e} N/m faulty"
+        text += f" healthy, {faulty.max():.4e} N/m faulty"
     return text

@@ -355,7 +355,7 @@ SET_VERBS = {
             text(
                 "--protocol",
                 "NAME",
-                "split to export, may be repeated; 'all': every one that keeps units apart "
+                "split to export, may be repeated; 'all': every one that keeps machines apart "
                 "(default: all, hf: new_machine, in a crossed set by_unit); "
                 "random_window_leaky only by its name",
                 action="append",
@@ -368,7 +368,7 @@ SET_VERBS = {
 
 OTHER_VERBS = {
     "measured": Verb(
-        summary="what a folder of measured recordings holds: classes, specimens, hashes, gaps",
+        summary="what a folder of measured recordings holds: classes, sets of gears, hashes, gaps",
         examples=(
             "gensig measured",
             "gensig measured mcc5_thu downloads/mcc5_thu",
@@ -410,7 +410,7 @@ OTHER_VERBS = {
         arguments=IMPLANT,
     ),
     "completion": Verb(
-        summary="what to source so that the tab key completes both commands",
+        summary="tab completion of both commands in bash, zsh or fish",
         examples=(
             "gensig completion bash",
             'eval "$(gensig completion zsh)"',

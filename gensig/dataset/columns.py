@@ -178,13 +178,13 @@ COLUMNS = columns_of_axes(
     ),
     ("gearbox_id", "str64", "", "unit", "housing, transfer path and bearings"),
     ("specimen_id", "str64", "", "unit", "set of gears with its manufacturing errors"),
-    ("unit_id", "str64", "", "unit", "one specimen in one gearbox"),
+    ("unit_id", "str64", "", "unit", "one set of gears in one gearbox"),
     (
         "condition_id",
         "str64",
         "",
         "condition",
-        "one unit at one set-point; its records share one noise level",
+        "one machine at one set-point; its records share one noise level",
     ),
     (
         "repeat",
@@ -198,8 +198,8 @@ COLUMNS = columns_of_axes(
         "int8",
         "1",
         "id",
-        "1: a sound record that shows its unit, no example and in no split; 0: an example (only "
-        "where plan.n_reference is above 0)",
+        "1: a healthy record for comparison, no example and in no split; 0: an example (only where "
+        "plan.n_reference is above 0)",
     ),
     (
         "status",
@@ -274,7 +274,7 @@ COLUMNS = columns_of_axes(
         "str64",
         "",
         "unit",
-        "the life that the record is a snapshot of, one a unit (run to failure only)",
+        "the life that the record is a snapshot of, one a machine (run to failure only)",
     ),
     (
         "life_time_h",
@@ -316,7 +316,7 @@ COLUMNS = columns_of_axes(
         "int32",
         "1",
         "unit",
-        "teeth of the pinion (only where units differ in their gears; else a root attribute)",
+        "teeth of the pinion (only where machines differ in their gears; else a root attribute)",
     ),
     ("n_teeth_wheel", "int32", "1", "unit", "teeth of the wheel (likewise)"),
     ("normal_module_mm", "float64", "mm", "unit", "normal module (likewise)"),

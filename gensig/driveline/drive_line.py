@@ -231,7 +231,7 @@ def drive_line_of_pair(system: GearPairMachine, name: str) -> DriveLine:
     """A single pair, with its motor and load, as a line of two to four nodes.
 
     Without the soft drive.
-    The mesh is held at the mean stiffness of sound teeth under the set torque.
+    The mesh is held at the mean stiffness of healthy teeth under the set torque.
     """
     dynamics = pair_dynamics(Run(system=system, faults=()))
     pair = system.pair

@@ -64,7 +64,7 @@ class TimeResponse:
 def tabulated_meshes(
     machine: EngineLine, config: Configuration, speed: float, torque: float
 ) -> dict[int, TabulatedMesh]:
-    """Tables of sound teeth by the index of their mesh, each under its mean force."""
+    """Tables of healthy teeth by the index of their mesh, each under its mean force."""
     mesh = config["mesh"]
     law = ToothLaw(
         material=read_material(config),

@@ -315,7 +315,7 @@ class LineMachine(Machine):
         return self.crank_angle(start)
 
     def linear_machine(self, run: Run[Self]) -> LinearDriveLine:
-        """The sound line in the gearbox of a run, at the set-point."""
+        """The healthy line in the gearbox of a run, at the set-point."""
         speed, torque = self.operating.speed / self.ratio, self.operating.torque
         running = running_line(
             self._in_gearbox(run), steady_course(speed, torque), governor=self._governor

@@ -156,7 +156,7 @@ def require_drive(pair: GearPair, slices: SliceOptions) -> None:
 def sound_meshes(
     machine: EngineLine, law: ToothLaw, forces: Array
 ) -> dict[int, TabulatedMesh]:
-    """Sound teeth of the meshes by their index, each under its mean force of ``forces`` (mesh,) N.
+    """Healthy teeth of the meshes by index, each under its mean force of ``forces`` (mesh,) N.
 
     Helical meshes only with ``system.helical_meshes=sliced``.
     """

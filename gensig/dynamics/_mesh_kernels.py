@@ -328,7 +328,7 @@ def papers_law(
 def coast_law(group, lane, work, wide):
     """Contact on the back flanks of one lane, added to its drive law.
 
-    Sound teeth without errors, no friction. Teeth count backwards along the mirrored roll. The
+    Healthy teeth without errors, no friction. Teeth count backwards along the mirrored roll. The
     pairs are kept in slot ``COAST`` and in the bites.
     """
     n = width(work)

@@ -35,7 +35,7 @@ class ToothRows:
 
     Parameters
     ----------
-    values : (row, chord, node, column)    the first row is that of sound teeth; helical teeth
+    values : (row, chord, node, column)    the first row is that of healthy teeth; helical teeth
         have the columns of ``Group.chord_table`` after those of ``Group.table``
     row : (tooth,)    row of every tooth of pinion and wheel, -1 for a missing one
     pinion_stride : rows from one pinion tooth to the next
@@ -340,7 +340,7 @@ def tooth_rows(table: PairTable | SlicedTable) -> ToothRows:
     wheel_kinds, wheel_row = np.unique(kinds[1], return_inverse=True)
     pinion = np.repeat(pinion_kinds, len(wheel_kinds))
     wheel = np.tile(wheel_kinds, len(pinion_kinds))
-    if pinion[0] != 0 or wheel[0] != 0:  # back flanks are those of sound teeth
+    if pinion[0] != 0 or wheel[0] != 0:  # back flanks are those of healthy teeth
         pinion, wheel = np.append(0, pinion), np.append(0, wheel)
         wheel_row = wheel_row + 1
     if isinstance(table, SlicedTable):

@@ -105,7 +105,7 @@ def least_gaps(table: PairTable | SlicedTable) -> list[Array]:
 def mean_mesh_stiffness(table: PairTable | SlicedTable, force: float) -> float:
     """Mean tangent stiffness over a base pitch under a force in N, N/m.
 
-    Of the kind of most teeth, the sound ones. Where no kind has a majority, the median over the
+    Of the kind of most teeth, the healthy ones. Where no kind has a majority, the median over the
     teeth.
     """
     if isinstance(table, SlicedTable):

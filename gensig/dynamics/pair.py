@@ -330,7 +330,7 @@ class PairDynamics:
 
     @cached_property
     def mean_mesh_stiffness(self) -> float:
-        """Mean tangent stiffness of sound teeth over one base pitch under the set torque, N/m."""
+        """Mean tangent stiffness of healthy teeth over one base pitch under the set torque, N/m."""
         return mean_mesh_stiffness(self.table, self.mesh_force)
 
     @property

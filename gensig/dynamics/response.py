@@ -55,7 +55,7 @@ class GearShaft:
 
 
 class LinearMachine(ABC):
-    """A sound machine whose meshes are held at their mean stiffness and damping."""
+    """A healthy machine whose meshes are held at their mean stiffness and damping."""
 
     @abstractmethod
     def shaft(self, gear: str) -> GearShaft:

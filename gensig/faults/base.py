@@ -164,7 +164,7 @@ def faulty_teeth(
     faults: Iterable[Fault],
     sound_teeth: Mapping[str, Tooth] | None = None,
 ) -> dict[tuple[str, int], Tooth]:
-    """The teeth that differ from the sound tooth, by (gear, tooth).
+    """The teeth that differ from the healthy tooth, by (gear, tooth).
 
     Several faults of a tooth compose in order. Teeth with equal faults are one object, so that
     the mesh computes them once. ``sound_teeth`` are the teeth without faults, by gear; None: as

@@ -67,7 +67,7 @@ class Crack(Fault):
         require_choice(self, "crack_faces", CRACK_FACES)
 
     def root_chord(self, gear: Gear) -> float:
-        """Thickness of the sound tooth where the crack starts, m."""
+        """Thickness of the healthy tooth where the crack starts, m."""
         return 2.0 * root_curve_point(gear, self.crack_start)[1]
 
     def seed(self) -> Crack:

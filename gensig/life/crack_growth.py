@@ -70,7 +70,7 @@ class CrackGrowthOptions(GrowthOptions):
         if smallest < LEAST_DEPTH or largest >= self.end_share:
             raise ConfigError(
                 f"life.crack.start_share = {self.start_share:g} spreads from {smallest:.3g} to "
-                f"{largest:.3g} among units; it must stay from {LEAST_DEPTH:g} to below "
+                f"{largest:.3g} among machines; it must stay from {LEAST_DEPTH:g} to below "
                 f"end_share = {self.end_share:g}"
             )
 

@@ -144,7 +144,7 @@ class MeasuredSet:
 
 
 def specimens(recordings: tuple[MeasuredRecording, ...]) -> dict[str, tuple[str, ...]]:
-    """Label -> its specimens, of recordings that have a label."""
+    """Label -> names of its sets of gears, of recordings that have a label."""
     found: dict[str, dict[str, None]] = {}
     for one in recordings:
         if one.label is not None:

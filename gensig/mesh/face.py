@@ -23,7 +23,7 @@ def is_nominal(tooth: Tooth) -> bool:
 
 
 def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) -> Array:
-    """Gap of each slice beyond that of a sound flank, (slice, phase) m.
+    """Gap of each slice beyond that of a healthy flank, (slice, phase) m.
 
     The mate rides on the edges of a hole: the gap is the lower envelope of both flanks along the
     common tangent, not the removed depth. The new corner of a flank without its tip touches.
@@ -93,7 +93,7 @@ def face_contact(
     bending : (phase,) m/N    of both teeth over the whole face, if slices bend alone; else 0
     """
     gaps = slice_gaps(tooth, curvature_radius, relative_radius)
-    if len(gaps) == 1 and np.isfinite(gaps).all():  # bears as a sound flank
+    if len(gaps) == 1 and np.isfinite(gaps).all():  # bears as a healthy flank
         return gaps[0], law.compliance(tooth.gear.face_width, load)
     gap, compliance = np.empty_like(load), np.empty_like(load)
     unit = bending * tooth.gear.face_width

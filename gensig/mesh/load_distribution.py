@@ -143,7 +143,7 @@ def loaded_pair_table(
     force: float,
     modification: PairModification = PLAIN,
 ) -> PairTable:
-    """Table for a total force in N: its contact term is the secant at the load of sound pairs."""
+    """Table for a total force in N: its contact term is the secant at the load of healthy pairs."""
     load: Array | float = force
     if options.contact != "linear":
         load = sound_load(pair, material, options, force, modification)
@@ -160,7 +160,7 @@ def sound_load(
     force: float,
     modification: PairModification = PLAIN,
 ) -> Array:
-    """Quasi-static load of a sound tooth pair at every node, (node,) N, read-only.
+    """Quasi-static load of a healthy tooth pair at every node, (node,) N, read-only.
 
     ``force`` is the total in N. Load sharing and local compliance depend on each other; the
     sharing changes by less than 1e-3 after three rounds.
@@ -178,7 +178,7 @@ def sound_load(
 
 
 def _sound_states(table: PairTable) -> PairStates:
-    """Sound tooth pairs at every node of one pitch, in order of entry."""
+    """Healthy tooth pairs at every node of one pitch, in order of entry."""
 
     def of_pairs(nodes: Array) -> Array:
         return nodes[:-1].reshape(N_PAIRS, table.options.points_per_pitch).T

@@ -55,7 +55,7 @@ class GearTable:
 class PairTable:
     """Both gears' tables on the node positions s of -1 to 3 base pitches.
 
-    The contact term of sound flanks is on the pinion's side. Each side adds what its faults cost
+    The contact term of healthy flanks is on the pinion's side. Each side adds what its faults cost
     against a sound mate. ``shared_compliance`` is the body compliance that all tooth pairs in
     contact share.
     """
@@ -254,7 +254,7 @@ def tooth_terms(
 def slice_bending(
     pair: GearPair, position: Array, material: Material, options: MeshOptions
 ) -> Array:
-    """Compliance of both sound teeth that every slice has for itself, (phase,) m/N.
+    """Compliance of both healthy teeth that every slice has for itself, (phase,) m/N.
 
     0 with ``bending=whole``.
 
@@ -279,7 +279,7 @@ class FlankSide:
     """One gear's flank at contact positions.
 
     ``flank_curvature`` goes on beyond its tip, ``curvature`` is held at A and E. ``base`` is the
-    ``share`` of a sound pair's contact compliance that is counted on the mate's side.
+    ``share`` of a healthy pair's contact compliance that is counted on the mate's side.
     """
 
     gear: Gear
@@ -329,7 +329,7 @@ def flank_sides(
 ) -> dict[str, FlankSide]:
     """Both gears' flanks at positions s, (phase,) m, under the load of a tooth pair in N.
 
-    ``pinion_share`` of the contact compliance of sound flanks is counted on the pinion's side.
+    ``pinion_share`` of the contact compliance of healthy flanks is counted on the pinion's side.
     """
     path = pair.path_of_contact
     on_path = np.clip(position, 0.0, path)
@@ -395,7 +395,7 @@ def distinct_teeth(
 ) -> tuple[list[Tooth], NDArray[np.int64]]:
     """Distinct objects among one gear's teeth, and the index of each tooth's object, (tooth,).
 
-    The first is the sound tooth; ``teeth`` are the others by (gear, tooth).
+    The first is the healthy tooth; ``teeth`` are the others by (gear, tooth).
     """
     distinct, index = [sound], {id(sound): 0}
     kind = np.zeros(sound.gear.n_teeth, dtype=np.int64)

@@ -126,7 +126,7 @@ def _require_checked(
 
 
 def _side_by_side(compliance: Array, through: Array) -> Array:
-    """Compliance of parallel strips, each in series with its crack, less the sound tooth, (phase,).
+    """Compliance of parallel strips, each in series with its crack, less the healthy tooth's.
 
     The strips share their deflection at the load as far as the tooth holds them together. Its
     compliance for this is ``TOGETHER`` times that of the tooth. The factor is calibrated to

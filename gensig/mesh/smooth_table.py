@@ -13,7 +13,7 @@ def smooth(values: Array, distance: float, limit: float) -> tuple[Array, Array]:
 
     Between nodes the slope is linear and the value is its integral. Values and slopes are thus
     consistent, and the energy balance holds between nodes too. The control points are the values
-    less a quarter of the second difference of the first row, the sound tooth. This makes up for
+    less a quarter of the second difference of the first row, the healthy tooth. This makes up for
     the curvature that a spline cuts off. The correction is clipped at ``limit``, so that no step
     rings. The order of rows is kept. A step becomes as wide as three nodes.
 

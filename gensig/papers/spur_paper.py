@@ -45,7 +45,7 @@ SEEN = {
 
 
 def stiffness() -> PaperFigure:
-    """Figure 5: mesh stiffness of sound gears, and without a tooth."""
+    """Figure 5: mesh stiffness of healthy gears, and without a tooth."""
     sound: list[Curve] = []
     missing: list[Curve] = []
     for name, words in CONVENTIONS.items():
@@ -65,7 +65,7 @@ def stiffness() -> PaperFigure:
             y_label="mesh stiffness, 1e8 N/m",
             curves=tuple(curves),
         )
-        for title, curves in (("sound", sound), ("missing tooth", missing))
+        for title, curves in (("healthy", sound), ("missing tooth", missing))
     )
     return PaperFigure(
         title="Mesh stiffness (figure 5)",

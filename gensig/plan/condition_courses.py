@@ -83,7 +83,7 @@ def _refuse_varied_teeth(vary: Collection[str]) -> None:
         if key.startswith(GEAR_KEYS) and key.endswith("n_teeth"):
             raise ConfigError(
                 f"operating.turns: the plan draws {key}, so the turns of the wheel take another "
-                "time in every unit; give operating.turns_of=pinion, or duration_s"
+                "time in every machine; give operating.turns_of=pinion, or duration_s"
             )
 
 

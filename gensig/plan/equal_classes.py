@@ -30,7 +30,7 @@ def equal_classes(config: Configuration, plan: Plan) -> list[str]:
 
     Compared is the static approach while the faulty tooth passes: all that the motion learns of
     the teeth, as long as a tooth that stands free does not swing into its mate. Every class is
-    compared with the sound machine, with a missing tooth, and with the classes before it, on the
+    compared with the healthy machine, with a missing tooth, and with the classes before it, on the
     machine of the record with the least torque: there teeth that stand back touch least.
     """
     reader = InputReader(config)

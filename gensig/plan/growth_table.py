@@ -109,7 +109,7 @@ class LifeGears:
 
     @cached_property
     def wear(self) -> WearTable:
-        """Wear of the sound flanks between the mean torques of the corners."""
+        """Wear of the healthy flanks between the mean torques of the corners."""
         sound = self._config.with_entries(fault=HEALTHY)
         options = read_wear_options(sound.section("wear"))
         case = flank_wear(self.machine.flanks, options)

@@ -118,7 +118,7 @@ def snapshots(config: Configuration) -> Iterator[Snapshot]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Life:
-    """Course of one unit with its fault; without a law the unit is sound all its life.
+    """Course of one unit with its fault; without a law the unit is healthy all its life.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
     if plan.get("n_reference"):
         raise ConfigError(
             f"plan.n_reference = {plan['n_reference']!r}: lives have no reference records; a "
-            "unit is new at its first snapshot: give 0"
+            "machine is new at its first snapshot: give 0"
         )
     for name, fault in config["classes"].items():
         kinds = {part["kind"] for part in fault_parts(fault)}

@@ -107,7 +107,7 @@ def make_plan(config: Configuration) -> Plan:
     sound = [name for name in names if not fault_parts(config["classes"][name])]
     if options.n_reference and not sound:
         raise ConfigError(
-            f"plan.n_reference = {options.n_reference}: reference records are sound, but no "
+            f"plan.n_reference = {options.n_reference}: reference records are healthy, but no "
             f"class of plan.classes [{', '.join(names)}] is; add healthy, or give 0"
         )
     rng = stream(seed, Stream.CONDITION)
@@ -132,7 +132,7 @@ def make_plan(config: Configuration) -> Plan:
             if len(rows) == counts.n_records:
                 break
             start = stream(seed, Stream.START, len(rows))
-            # The first sound record of a condition is the twin that sets its noise.
+            # The first healthy record of a condition is the twin that sets its noise.
             if repeat == 0 and sound[:1] == [names[label]]:
                 start = stream(seed, Stream.TWIN, condition)
             ids = _ids(options, label, unit, gearbox, specimen, condition, repeat)
@@ -155,10 +155,10 @@ def _reference_rows(
     designs: UnitDesigns,
     label: int,
 ) -> list[dict[str, Any]]:
-    """Sound records of every unit with an example, each at a condition of its own.
+    """Healthy records of every unit with an example, each at a condition of its own.
 
     Their conditions are drawn as those of the examples, by a stream of their own; where those are
-    a grid, as a Latin hypercube. Like a sound example, each is the twin that sets its noise.
+    a grid, as a Latin hypercube. Like a healthy example, each is the twin that sets its noise.
     """
     options = read_plan_options(config)
     n_units = min(counts.n_units, counts.n_conditions)
@@ -368,14 +368,14 @@ def _fitting(plan: PlanOptions, n_records: int, counts: tuple[int, ...]) -> int:
 
     Raises ConfigError where ``plan.n_records`` is another number, or a grid is too large.
     """
-    names = ("units", "conditions", "faults", "classes", "repeats")
+    names = ("machines", "conditions", "faults", "classes", "repeats")
     named = zip((*counts, plan.n_repeats), names, strict=True)
     product = " x ".join(f"{n:,} {name}" for n, name in named if n > 1)
     sum_of_all = f"{n_records:,} records ({product})" if product else "1 record"
     if plan.is_grid and n_records > MOST_IN_GRID:
         raise ConfigError(
-            f"the grid has {sum_of_all}, more than {MOST_IN_GRID:,}; take fewer levels, units or "
-            "repeats"
+            f"the grid has {sum_of_all}, more than {MOST_IN_GRID:,}; take fewer levels, "
+            "machines or repeats"
         )
     if plan.n_records not in (None, n_records):
         raise ConfigError(

@@ -113,7 +113,7 @@ def _request(source: Source, overrides: tuple[str, ...]) -> Request:
             f"fault={names[0]} replaces plan.classes [{', '.join(map(str, listed))}]"
         )
         if "plan.n_reference" not in words.keys and fault_parts(selected.option):
-            base["plan"]["n_reference"] = 0  # no class of the plan is sound
+            base["plan"]["n_reference"] = 0  # no class of the plan is healthy
     base["plan"]["classes"] = names
     notes += _keep_typed_gear(words, base["plan"])
     pinned = dict.fromkeys(

@@ -27,7 +27,7 @@ def tooth_reach(machine: Machine, gear: str) -> float:
     contact, by the gap at their tips too. The reach is the most by which the flank without the
     error would then be inside its mate, over the passage of the tooth:
 
-        reach = max over roll of (approach - shared compliance x force - gap of the sound pair)
+        reach = max over roll of (approach - shared compliance x force - gap of the healthy pair)
 
     with the approach of the mesh without that tooth. It grows with the torque. Static, at the
     set-point, with teeth that have no other errors. A tooth farther back is never loaded: the

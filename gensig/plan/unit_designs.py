@@ -95,8 +95,8 @@ def check_designs(config: Configuration, options: PlanOptions) -> None:
     key = next(key for key in options.vary if key.startswith(GEAR_KEYS))
     if not options.has_separate_machines:
         raise ConfigError(
-            f"plan.vary: '{key}' is drawn once a unit, but with plan.machines={CROSSED} units "
-            f"share their gears; give plan.machines={SEPARATE}, or sets of one design with -m"
+            f"plan.vary: '{key}' is drawn once a machine, but with plan.machines={CROSSED} "
+            f"machines share their gears; give plan.machines={SEPARATE}, or several sets with -m"
         )
     if kind == LINE:
         raise ConfigError(
@@ -131,7 +131,7 @@ def _draw_design(
         else:
             return values
     raise ConfigError(
-        f"plan.vary: none of {MOST_DRAWS} designs drawn for unit {unit} can be made; narrow the "
+        f"plan.vary: none of {MOST_DRAWS} designs drawn for machine {unit} can be made; narrow the "
         f"distributions of {GEAR_KEYS}*. The last: {reason}"
     )
 

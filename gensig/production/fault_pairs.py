@@ -184,7 +184,7 @@ def make_pairs(
     config = config.with_entries(seed=epoch_seed(config.seed, epoch))
     _check_fault_and_noise(config)
     fault = config["fault"]
-    whole_number("the number of units", n_units, at_least=FEWEST_UNITS)
+    whole_number("the number of machines", n_units, at_least=FEWEST_UNITS)
     speeds = _levels(
         "speeds in r/min", speeds_rpm, config["operating"]["speed_rpm"], SPEED_SHARES
     )

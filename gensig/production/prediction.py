@@ -83,8 +83,8 @@ def predict(
         "records": f"{examples.n_records:,}",
         **_references(table),
         "classes": ", ".join(f"{name} {count:,}" for name, count in classes.items()),
-        "units": f"{n_different(table, 'unit_id'):,}",
-        "specimens": f"{n_different(table, 'specimen_id'):,} (sets of gears)",
+        "machines": f"{n_different(table, 'unit_id'):,}",
+        "sets of gears": f"{n_different(table, 'specimen_id'):,}",
         "gearboxes": f"{n_different(table, 'gearbox_id'):,}",
         "conditions": f"{n_different(examples, 'condition_id'):,}",
         "design": describe_design(config),
@@ -101,7 +101,7 @@ def _varied(config: Configuration) -> str:
     """Varied keys with their ranges, a line each."""
     varied = varied_keys(config)
     if not varied:
-        return "no key; records differ in start, noise and, by unit, in their errors"
+        return "no key; records differ in start, noise and, by machine, in their errors"
     width = max(map(len, varied))
     return "\n".join(f"{key:<{width}}  {text}" for key, text in varied.items())
 
@@ -112,7 +112,9 @@ def _references(table: Plan) -> dict[str, str]:
     if not n_reference:
         return {}
     each = n_reference // n_different(table, "unit_id")
-    return {"references": f"{n_reference:,} more ({each} a unit, sound, in no split)"}
+    return {
+        "references": f"{n_reference:,} more ({each} a machine, healthy, in no split)"
+    }
 
 
 def _warn_of_failed(records: Sequence[Record]) -> None:

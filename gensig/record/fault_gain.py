@@ -27,7 +27,7 @@ def with_fault_gain(inputs: RecordInputs, motion: Motion, sound: Motion) -> Moti
 
     Accelerations are ``sound + gain (motion - sound)`` at the bearings, before transfer path,
     sensors and noise; path and sensors are linear up to the converter. Shaft angle, speed, loads
-    of the teeth and accuracy stay those of the simulation. A sound record, and any at gain 1, is
+    of the teeth and accuracy stay those of the simulation. A healthy record, and any at gain 1, is
     returned as it is.
 
     Parameters

@@ -125,7 +125,7 @@ class RecordInputs:
         return stream(self.seed, cause, getattr(self.numbers, SUBJECTS[cause]))
 
     def without_faults(self) -> RecordInputs:
-        """The same record of the sound machine: same start, unit and condition."""
+        """The same record of the healthy machine: same start, unit and condition."""
         return replace(self, run=replace(self.run, faults=(), with_mesh_state=False))
 
     def from_start(self, start: Start) -> RecordInputs:
@@ -133,7 +133,7 @@ class RecordInputs:
         return replace(self, run=replace(self.run, start=start))
 
     def healthy_twin(self) -> RecordInputs:
-        """The sound record that sets the noise of the condition.
+        """The healthy record that sets the noise of the condition.
 
         It starts as no row of the plan decides.
         """
@@ -208,7 +208,7 @@ def simulate_motions(
 
     The bits of a record do not depend on the others of the call.
     """
-    # A twin may share the run of a sound record.
+    # A twin may share the run of a healthy record.
     runs = {id(each.run): each.run for each in inputs}
     results = dict(zip(runs, simulate_with_lead_in(list(runs.values())), strict=True))
     motions = []

@@ -89,7 +89,7 @@ class PlanOptions:
         gears and a gearbox of its own
     fault_gear : ``as_given``: faults are on the gear that their option names; ``drawn``: on
         any gear of the machine, or on one of those listed, with equal chance for each condition
-    n_reference : further sound records of every unit, which are no examples
+    n_reference : further healthy records of every unit, which are no examples
     """
 
     n_records: int | None
@@ -215,5 +215,5 @@ def _check_machines(plan: Section) -> None:
     if machines == SEPARATE and plan["n_gearboxes"] is not None:
         raise ConfigError(
             f"plan.n_gearboxes = {plan['n_gearboxes']!r}: with plan.machines={SEPARATE} every "
-            "unit has a gearbox of its own; give plan.n_gearboxes=null"
+            "machine has a gearbox of its own; give plan.n_gearboxes=null"
         )

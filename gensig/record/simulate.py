@@ -347,7 +347,7 @@ def _missing_twins(
 ) -> dict[TwinKey, RecordInputs]:
     """Inputs of the healthy twins that noise needs and that are not known yet.
 
-    A plan lets the sound record of a group start as the twin does. Where that record is among the
+    A plan lets the healthy record of a group start as the twin does. Where that record is among the
     inputs, it is the twin, and its run is simulated once.
     """
     twins: dict[TwinKey, RecordInputs] = {}

@@ -67,7 +67,7 @@ class WornVibration:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Bench:
-    """Measures the vibration of a sound machine whose flanks are worn to given depths."""
+    """Measures the vibration of a healthy machine whose flanks are worn to given depths."""
 
     sound: RecordInputs
     case: WearCase

@@ -26,7 +26,7 @@ HARMFUL_VELOCITY = 11.0e-3
 ZONES = "ABCD"
 ZONE_LIMITS = {300.0: (1.4, 2.8, 4.5), float("inf"): (2.3, 4.5, 7.1)}
 LEAST_POWER = 15.0  # kW, from which the standard applies
-# assumed: published housings of sound gears stay below
+# assumed: published housings of healthy gears stay below
 LOUD_ACCELERATION = 10.0 * STANDARD_GRAVITY
 
 

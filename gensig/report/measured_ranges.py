@@ -67,7 +67,7 @@ def compare_with_measurements(
 def _ratios(
     data: Dataset, measured: Measured, values: dict[str, FloatArray]
 ) -> dict[RangeKey, FloatArray]:
-    """Faulty record over sound one of another set of gears, in one gearbox at one set-point."""
+    """Faulty record over healthy one of another set of gears, in one gearbox at one set-point."""
     records = measured.records
     if "speed_set_rpm" not in data.column_names:
         return {}

@@ -135,7 +135,7 @@ def _signal_lines(data: Dataset, chosen: Choice) -> list[str]:
     """Sentences on the records that are shown."""
     n_conditions = counted(len(chosen.conditions), "whole condition")
     lines = [
-        f"{chosen.n_records} of {data.n_records} records, as {n_conditions}: one unit at one "
+        f"{chosen.n_records} of {data.n_records} records, as {n_conditions}: one machine at one "
         "speed and torque. A record is compared with others of its condition only."
     ]
     if chosen.remark:

@@ -32,7 +32,7 @@ BESIDE: dict[HealthyKind, str] = {
     "own": "healthy record of the same condition",
     "twin": "healthy twin: the same record without its fault, in noise of its own",
     "earlier": "least damaged record of the same life and condition",
-    "near": "healthy record of another condition of the same unit: there is none of its own, "
+    "near": "healthy record of another condition of the same machine: there is none of its own, "
     "and this is the nearest in speed",
 }
 

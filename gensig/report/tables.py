@@ -17,6 +17,7 @@ from gensig.dataset.cards.card import (
 from gensig.dataset.cards.facts import geometry_facts, rounded, value_range
 from gensig.dataset.folder.layout import CONFIG, CONFIG_BYTES_LIMIT, OVERRIDES
 from gensig.dataset.reader import Dataset
+from gensig.dataset.splitting.dealing import GROUP_NAMES
 from gensig.dataset.splitting.protocols import PROTOCOLS
 from gensig.dataset.storage.atomic import read_text
 from gensig.report.realism import Comparison, shown_range
@@ -69,7 +70,7 @@ def contents(data: Dataset) -> list[Section]:
         for name, value in geometry_facts(data).items()
     ]
     counted = {
-        "units": "unit_id",
+        "machines": "unit_id",
         "sets of gears": "specimen_id",
         "gearboxes": "gearbox_id",
     }
@@ -109,7 +110,7 @@ def _classes(data: Dataset) -> Table:
         spread = value_range(severity, "")
         rows.append((plain(name), f"{is_class.sum()}", f"{n_units}", spread, median))
     return Table(
-        head=("class", "records", "units", "severity", "its median"), rows=rows
+        head=("class", "records", "machines", "severity", "its median"), rows=rows
     )
 
 
@@ -130,7 +131,7 @@ def splits(data: Dataset) -> Section:
         ]
         apart = []
         if protocol in PROTOCOLS:
-            apart = [name.removesuffix("_id") for name in PROTOCOLS[protocol].apart]
+            apart = [GROUP_NAMES[name][1] for name in PROTOCOLS[protocol].apart]
         if not apart:
             leaky.append(len(rows))
         shared = len(units["train"] & units["test"])
@@ -141,11 +142,11 @@ def splits(data: Dataset) -> Section:
         "train",
         "validation",
         "test",
-        "units on both sides",
+        "machines on both sides",
         "keeps apart",
     )
     text = [
-        "Records of each subset, and in brackets the units that they are from.",
+        "Records of each subset, and in brackets the machines that they are from.",
         "A score is only worth what its protocol keeps apart.",
     ]
     left_out = [(name, plain(reason)) for name, reason in data.left_out.items()]
@@ -161,10 +162,10 @@ def measured_table(compared: Sequence[Comparison], units: Sequence[str]) -> Sect
     """Values of the set with measured ranges, or the reason why there are none."""
     text = [
         "Central 90 % of this set's values beside ranges of published recordings of a "
-        "two-stage parallel spur gearbox (5 kHz, one specimen a class), which is another "
+        "two-stage parallel spur gearbox (5 kHz, one set of gears a class), which is another "
         "machine: a miss says that they differ, not which is wrong. RMS and kurtosis are "
-        'those of the band up to 2.5 kHz; "elsewhere" is not slow and light, here all '
-        "records."
+        'those of the band up to 2.5 kHz. Ranges "elsewhere" were published for all '
+        "conditions but the slow and light ones; here they stand beside all records."
     ]
     if not compared:
         reason = "it has none of their quantities"

@@ -1,4 +1,4 @@
-"""Vibration of a sound machine besides its mesh: forces at orders of its shafts.
+"""Vibration of a healthy machine besides its mesh: forces at orders of its shafts.
 
 Every class draws them alike.
 """

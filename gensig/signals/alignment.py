@@ -20,7 +20,7 @@ from gensig.signals.separation import FloatArray, GearTurns
 SpectrumArray = NDArray[np.complexfloating]
 
 BAND = 1.0  # mesh orders over which the transfer is smoothed; assumed
-RIDGE = 1e-3  # of the mean power of a sound turn, beside that at every order; assumed
+RIDGE = 1e-3  # of the mean power of a healthy turn, beside that at every order; assumed
 TINY = 1e-300
 
 
@@ -57,12 +57,12 @@ def rotation(turn: FloatArray, to: FloatArray) -> int:
 
 
 def changed_turns(turns: GearTurns, sound: Sequence[GearTurns]) -> GearTurns:
-    """Turns less what sound recordings of the machine predict of them.
+    """Turns less what healthy recordings of the machine predict of them.
 
     Parameters
     ----------
     turns : of a recording
-    sound : of one or more sound recordings, begun anywhere, with as many channels, and samples a
+    sound : of one or more healthy recordings, begun anywhere, with as many channels, and samples a
         tooth
 
     Returns
@@ -71,7 +71,7 @@ def changed_turns(turns: GearTurns, sound: Sequence[GearTurns]) -> GearTurns:
 
     Notes
     -----
-    The spectra of all sound turns, rotated to the recording, predict the spectrum of its turn by
+    The spectra of all healthy turns, rotated to the recording, predict the spectrum of its turn by
     least squares over a Hann window of `BAND` mesh orders about each order. This is the conditioned
     spectrum of Bendat & Piersol (2010), "Random data", chapter 7, with shaft orders in place of
     averages.
@@ -92,12 +92,12 @@ def changed_turns(turns: GearTurns, sound: Sequence[GearTurns]) -> GearTurns:
 def changed_turn(
     turn: FloatArray, sound: Sequence[FloatArray], samples_per_tooth: float
 ) -> FloatArray:
-    """Part of a turn that sound turns of the same shaft do not predict.
+    """Part of a turn that healthy turns of the same shaft do not predict.
 
     Parameters
     ----------
     turn : (channel, sample)
-    sound : of one or more sound recordings, as long, rotated to the turn
+    sound : of one or more healthy recordings, as long, rotated to the turn
     samples_per_tooth : a mesh order is a turn's samples over these
 
     Returns

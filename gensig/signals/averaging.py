@@ -170,7 +170,7 @@ def remove_orders(average: ArrayLike, orders: Iterable[int]) -> FloatArray:
 def regular_signal(
     average: ArrayLike, n_teeth: int, *, n_sidebands: int = 1
 ) -> FloatArray:
-    """Regular mesh of a sound gear: every mesh harmonic with the lowest sidebands.
+    """Regular mesh of a healthy gear: every mesh harmonic with the lowest sidebands.
 
     The lowest shaft orders are left out.
 

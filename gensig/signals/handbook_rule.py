@@ -1,7 +1,8 @@
 """Rule of thumb of handbooks: impulsive means one tooth, louder means many.
 
 Kurtosis above 6 and a level of 3 dB above healthy are usual alarm limits; neither is derived. The
-kurtosis of sound machines is near 3: Dyer & Stewart (1978), J. Mechanical Design 100 (2), 229-235.
+kurtosis of healthy machines is near 3: Dyer & Stewart (1978), J. Mechanical Design 100 (2),
+229-235.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Parts of the teeth of a gear that the other teeth do not explain.
 
-Errors of sound teeth differ in size and little in shape: pitch and profile errors excite a machine
-in few ways. A damaged tooth excites it in another way.
+Errors of healthy teeth differ in size and little in shape: pitch and profile errors excite a
+machine in few ways. A damaged tooth excites it in another way.
 """
 
 from __future__ import annotations

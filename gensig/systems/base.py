@@ -250,7 +250,7 @@ class Machine(ABC):
 
     @abstractmethod
     def linear_machine(self, run: Run[Self]) -> LinearMachine:
-        """The sound machine of a run, in its gearbox, as nuisances meet it."""
+        """The healthy machine of a run, in its gearbox, as nuisances meet it."""
 
     @abstractmethod
     def check(self) -> None:

@@ -40,7 +40,7 @@ def with_nuisances(
     """A record whose bearings also feel what ``sensing.nuisances`` lists; without any, the record
     itself.
 
-    The machine that answers is the sound one whatever the run's faults: nothing but the shaft's
+    The machine that answers is the healthy one whatever the run's faults: nothing but the shaft's
     own angle, which the forces follow, differs from one class to another. ``units`` has a
     generator a level, see ``draw_tones``.
     """

@@ -161,7 +161,7 @@ class GearPairMachine(Machine):
         return
 
     def linear_machine(self, run: Run[Self]) -> LinearPair:
-        """The sound pair in the gearbox of a run."""
+        """The healthy pair in the gearbox of a run."""
         return LinearPair(
             dynamics=pair_dynamics(replace(run, faults=(), specimen=None))
         )

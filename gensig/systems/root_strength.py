@@ -66,7 +66,7 @@ class GearStress:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RootStrength:
-    """A pair with sound teeth, its strength and the torque on its pinion in N m.
+    """A pair with healthy teeth, its strength and the torque on its pinion in N m.
 
     ``sliced`` is True where the face is cut into slices: helical pairs, and spur pairs with
     modified flanks.

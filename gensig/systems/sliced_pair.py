@@ -77,7 +77,7 @@ class TransmissionError:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlicedPair:
-    """A gear pair with sound teeth, its flank modification, and the pinion's torque in N m.
+    """A gear pair with healthy teeth, its flank modification, and the pinion's torque in N m.
 
     ``growth`` is the deviation of flanks by heat, beyond the growth of the pair as a whole, see
     ``gensig.systems.hot_pair``. ``hot_teeth`` is the growth of teeth by ``mesh.heat_law=paper``.
@@ -138,8 +138,8 @@ class SlicedPair:
     ) -> TransmissionError:
         """Loaded contact over one mesh period.
 
-        With faults, over all periods in which one is in contact, and two sound ones on either
-        side. The first faulty tooth of either gear meets that of the other, or a sound one.
+        With faults, over all periods in which one is in contact, and two healthy ones on either
+        side. The first faulty tooth of either gear meets that of the other, or a healthy one.
 
         Raises
         ------
@@ -169,7 +169,7 @@ class SlicedPair:
         )
 
     def pressure_error(self, result: TransmissionError) -> float:
-        """Estimated relative error of the largest pressure of sound flanks by the slices' width.
+        """Estimated relative error of the largest pressure of healthy flanks by the slices' width.
 
         Twice the change from half as many slices. On unmodified flanks the largest pressure is at
         the corners of the face, where it grows with about the power 0.75 of the number of slices;

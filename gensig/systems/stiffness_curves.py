@@ -50,9 +50,9 @@ class StiffnessCurves:
     """Quasi-static mesh of one pair. SI units, angles in rad.
 
     By contact position (from A, base pitches): stiffness of a single pair under the whole load,
-    sound and (with faults) faulty, gap of the faulty pair, and the compliance terms by gear. The
+    healthy and (with faults) faulty, gap of the faulty pair, and the compliance terms by gear. The
     faulty pair is that of the first faulty tooth of either gear. By roll angle of the faulty gear
-    (pinion when sound): mesh stiffness as the tangent dF/d(approach) under the set torque.
+    (pinion when healthy): mesh stiffness as the tangent dF/d(approach) under the set torque.
     """
 
     contact_position: Array
@@ -94,7 +94,7 @@ def stiffness_curves(
 ) -> StiffnessCurves:
     """Single-pair and mesh stiffness with their parts; contact ratios below 1 are allowed.
 
-    ``whole`` are the sound teeth by gear, as designed.
+    ``whole`` are the healthy teeth by gear, as designed.
     """
     pair = machine.pair
     position = np.linspace(0.0, pair.path_of_contact, n_positions)
@@ -127,10 +127,10 @@ def single_pair(
     faults: Sequence[Fault],
     whole: Mapping[str, Tooth],
 ) -> SinglePair:
-    """The pair of each gear's first changed tooth, or of a sound one, under the whole load.
+    """The pair of each gear's first changed tooth, or of a healthy one, under the whole load.
 
-    Half of the contact term of sound flanks belongs to either gear. An increase by a fault belongs
-    to the faulty gear.
+    Half of the contact term of healthy flanks belongs to either gear. An increase by a fault
+    belongs to the faulty gear.
     """
     pair, material, mesh = machine.pair, machine.material, machine.mesh
     odd = faulty_teeth(pair, faults, whole)

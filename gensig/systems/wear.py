@@ -32,7 +32,7 @@ def read_wear_case(config: Configuration) -> WearCase:
     """
     if read_faults(config["fault"]):
         raise ConfigError(
-            f"fault={config['fault']['kind']}: a life begins with sound flanks; "
+            f"fault={config['fault']['kind']}: a life begins with healthy flanks; "
             "take fault=healthy"
         )
     return flank_wear(
@@ -41,7 +41,7 @@ def read_wear_case(config: Configuration) -> WearCase:
 
 
 def flank_wear(flanks: SlicedPair, options: WearOptions) -> WearCase:
-    """Wear of sound flanks under their torque; errors as ``wear_case`` raises."""
+    """Wear of healthy flanks under their torque; errors as ``wear_case`` raises."""
     # all slices of plain spur teeth are alike
     if flanks.pair.pinion.helix_angle == 0.0 and not flanks.modification.is_any:
         flanks = replace(flanks, slices=replace(flanks.slices, n_slices=1))

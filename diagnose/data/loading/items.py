@@ -14,7 +14,7 @@ from diagnose.data.lives import COLUMNS as LIFE_COLUMNS
 from diagnose.data.windows import Task, check_names
 from gensig.errors import ConfigError
 
-NO_GEAR = "none"  # first of the names of a gear target: a sound record
+NO_GEAR = "none"  # first of the names of a gear target: a healthy record
 # Columns that metadata hold, as far as a data set has them.
 METADATA = (
     "record_id",

@@ -88,7 +88,7 @@ def plot_sliced_stiffness(
     sound: TransmissionError,
     faulty: Array | None = None,
 ) -> None:
-    """Draw the stiffness of one tooth pair and of the mesh, sound and faulty.
+    """Draw the stiffness of one tooth pair and of the mesh, healthy and faulty.
 
     ``sound`` is the mesh without the fault.
     """
@@ -96,15 +96,15 @@ def plot_sliced_stiffness(
     pair, mesh = axes[0]
     pitches = position / system.pair.base_pitch
     stiffness = result.contact.stiffness / 1e9
-    curve(pair, pitches, single / 1e9, SOUND, "sound")
+    curve(pair, pitches, single / 1e9, SOUND, "healthy")
     if faulty is None:
-        curve(mesh, *_over_periods(system, result, stiffness), SOUND, "sound")
+        curve(mesh, *_over_periods(system, result, stiffness), SOUND, "healthy")
     else:
         curve(pair, pitches, faulty / 1e9, FAULTY, "faulty")
         pair.legend()
         without = np.resize(sound.contact.stiffness, stiffness.shape) / 1e9
         periods = _over_periods(system, result, without)
-        curve(mesh, *periods, GREY, "sound", width=0.8)
+        curve(mesh, *periods, GREY, "healthy", width=0.8)
         curve(mesh, *_over_periods(system, result, stiffness), FAULTY, "faulty")
         mesh.legend()
     titles(pair, "One pair, slices on the path", FIRST_SLICE, STIFFNESS)
@@ -201,7 +201,7 @@ def _sharing_with_fault(
     roll = result.contact.roll / system.pair.base_pitch
     index = result.contact.pair_index
     first, last = odd_pairs
-    labels = {first: "pair of faulty teeth", first - 1: "sound pairs"}
+    labels = {first: "pair of faulty teeth", first - 1: "healthy pairs"}
     for pair in range(index.min(), index.max() + 1):
         share = np.where(index == pair, result.load_share, 0.0).sum(axis=1)
         in_contact = (index == pair).any(axis=1) & (share > 0.0)

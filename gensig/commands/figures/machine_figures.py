@@ -65,7 +65,7 @@ def plot_stiffness(
 
 def _single_pair(axes: Any, curves: StiffnessCurves, faults: Sequence[Fault]) -> None:
     position = curves.contact_position
-    curve(axes, position, curves.single_pair_stiffness / 1e8, SOUND, "sound pair")
+    curve(axes, position, curves.single_pair_stiffness / 1e8, SOUND, "healthy pair")
     if curves.faulty_pair_stiffness is not None:
         stiffness = curves.faulty_pair_stiffness / 1e8
         label = f"{faults[0].kind} pair"
@@ -94,10 +94,10 @@ def _mesh(
         curve(axes, angle, stiffness, SOUND, width=0.9)
     else:
         fault, gear = faults[0], faults[0].gear
-        # A sound mesh repeats with every tooth, so that its turn of the pinion fits a turn of
+        # A healthy mesh repeats with every tooth, so that its turn of the pinion fits a turn of
         # the wheel too.
         without = np.resize(sound.mesh_stiffness, angle.shape) / 1e8
-        curve(axes, angle, without, GREY, "sound", width=0.7)
+        curve(axes, angle, without, GREY, "healthy", width=0.7)
         curve(axes, angle, stiffness, SOUND, f"with {fault.kind}", width=0.9)
         begin, pitch = _fault_angle(system, fault), _pitch_angle(system, faults)
         end = begin + pitch * system.pair.transverse_contact_ratio

@@ -181,7 +181,7 @@ def sound_pair(config: Configuration) -> SlicedPair:
     """The pair of a configuration without a fault."""
     if read_faults(config["fault"]):
         raise ConfigError(
-            f"fault={config['fault']['kind']}: a modification is for sound flanks; "
+            f"fault={config['fault']['kind']}: a modification is for healthy flanks; "
             "take fault=healthy, and gensig transmission-error "
             "with that modification and the fault"
         )

@@ -243,7 +243,7 @@ def _torsion_cuts(
 
 
 def _modes(machine: Machine) -> list[Mode]:
-    """Natural frequencies of the nominal sound machine that can resonate, lowest first."""
+    """Natural frequencies of the nominal healthy machine that can resonate, lowest first."""
     if isinstance(machine, LineMachine):
         modes = machine.engine.drive.modes()
         frequency, damping = modes.frequency, modes.damping_ratio

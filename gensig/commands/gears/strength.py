@@ -60,7 +60,7 @@ def root_stress(arguments: Namespace) -> int:
     config = read_configuration(arguments)
     if read_faults(config["fault"]):
         raise ConfigError(
-            f"fault={config['fault']['kind']}: root stress is that of sound teeth here; "
+            f"fault={config['fault']['kind']}: root stress is that of healthy teeth here; "
             "take fault=healthy, and gensig stiffness for what faults do to the mesh"
         )
     system = read_root_strength(config)

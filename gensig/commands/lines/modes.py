@@ -46,7 +46,7 @@ def read_line(config: Configuration) -> DriveLine:
     """The drive line of a configuration; a single pair becomes one of two nodes and more."""
     if read_faults(config["fault"]):
         raise ConfigError(
-            f"fault={config['fault']['kind']}: modes are those of sound teeth at mean "
+            f"fault={config['fault']['kind']}: modes are those of healthy teeth at mean "
             "stiffness; take fault=healthy"
         )
     kind = config.section("system").get("kind")

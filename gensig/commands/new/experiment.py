@@ -85,7 +85,7 @@ def experiment_text(option: GearOption, wishes: Wishes) -> str:
     lines = [
         "# @package _global_",
         f"# Written by gensig new gearbox: {n_records} records of {name}, "
-        f"{len(classes)} classes from {N_UNITS} units. "
+        f"{len(classes)} classes from {N_UNITS} machines. "
         "Faults are drawn in shares of a tooth.",
     ]
     defaults = []
@@ -278,10 +278,10 @@ def plan_lines(
     lowest = LOWEST_SNR[wishes.base]
     lines = [
         "plan:",
-        remarked(f"  n_records: {n_records}", "assumed: one of each class and unit"),
+        remarked(f"  n_records: {n_records}", "assumed: one of each class and machine"),
         remarked(
             f"  n_units: {N_UNITS}",
-            "assumed; a unit is one set of gears in one housing",
+            "assumed; a machine is one set of gears in one housing",
         ),
         remarked(
             "  n_gearboxes: null",

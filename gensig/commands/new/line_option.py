@@ -116,7 +116,7 @@ def staged_experiment_text(
     lines = [
         "# @package _global_",
         f"# Written by gensig new gearbox: {n_records} records of {sheet.name}, "
-        f"{len(classes)} classes from {N_UNITS} units. Faults are",
+        f"{len(classes)} classes from {N_UNITS} machines. Faults are",
         "# drawn in shares of a tooth, on any gear. On one gear: "
         "plan.fault_gear=as_given fault.gear=wheel",
         "defaults:",

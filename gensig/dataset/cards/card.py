@@ -14,6 +14,7 @@ from gensig.dataset.cards.facts import geometry_facts, value_range
 from gensig.dataset.cards.origin import origin_of
 from gensig.dataset.folder.layout import CARD, CROISSANT, SHARDS
 from gensig.dataset.reader import Dataset, open_dataset
+from gensig.dataset.splitting.dealing import GROUP_NAMES
 from gensig.dataset.splitting.splits import SUBSETS
 from gensig.dataset.storage.atomic import write_text
 
@@ -186,9 +187,8 @@ def set_facts(data: Dataset) -> list[tuple[object, ...]]:
         "channels": ", ".join(f"{name} ({unit})" for name, unit in pairs),
     }
     facts |= geometry_facts(data)
-    for part in ("unit", "specimen", "gearbox"):
-        plural = f"{part}{'e' * part.endswith('x')}s"
-        facts[plural] = len(np.unique(data.column(f"{part}_id")))
+    for column, (_, plural) in GROUP_NAMES.items():
+        facts[plural] = len(np.unique(data.column(column)))
     speed, torque = data.column("speed_rpm"), data.column("torque_nm")
     facts["speed of the driving shaft"] = value_range(speed, "r/min")
     facts[torque_words(data)] = value_range(torque, "N m")

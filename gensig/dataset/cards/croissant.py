@@ -126,7 +126,7 @@ def _responsible_ai(data: Dataset, facts: str, caveats: str) -> dict[str, Any]:
         "rai:dataBiases": [
             f"Records per class: {classes}; real machines are nearly always healthy.",
             f"{kind_of_machine(data)}, "
-            f"{len(np.unique(data.column('unit_id')))} units drawn from assumed scatter.",
+            f"{len(np.unique(data.column('unit_id')))} machines drawn from assumed scatter.",
             f"{failed} records failed and are marked so.",
         ],
         "rai:dataUseCases": [

@@ -43,7 +43,7 @@ nothing of a machine that was not trained on. Never report it without a clean sp
 """
 
 UNCHECKED = """**`{protocol}` is unchecked.** The version of gensig that wrote this folder does \
-not know which units
+not know which machines
 it keeps apart.
 """
 
@@ -58,7 +58,7 @@ Columns of role label, fault or
 - The speed and the signal power of a record are results: a fault may change them. Report results \
 with and
   without RMS normalization.
-- A clean split compares scores on units never seen. Tune on `validation`; use `test` once.
+- A clean split compares scores on machines never seen. Tune on `validation`; use `test` once.
 """
 
 OTHER_COLUMNS = {
@@ -174,7 +174,7 @@ def _split_words(data: Dataset) -> str:
     """Paragraph on configurations and on the records that none of them has."""
     words = (
         "A configuration is one protocol with files of its own, so a record may be in several. "
-        "A unit is one set of gears (specimen) in one gearbox. No value of the columns named "
+        "A machine is one set of gears in one gearbox. No value of the columns named "
         "below is in two subsets."
     )
     n_failed = int((~data.usable).sum())

@@ -91,8 +91,8 @@ def hardest_protocol(data: Dataset) -> str:
         return clean[0]
     reason = data.left_out.get("by_unit", "by_unit is missing")
     raise DatasetError(
-        f"{data.folder} has no split that keeps units apart ({reason}); make a set of more units "
-        "(plan.n_units), or name a protocol with --protocol"
+        f"{data.folder} has no split that keeps machines apart ({reason}); make a set of more "
+        "machines (plan.n_units), or name a protocol with --protocol"
     )
 
 

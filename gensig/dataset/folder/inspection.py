@@ -105,8 +105,8 @@ def _dataset_lines(data: Dataset) -> list[str]:
     ]
     for title, column in (
         ("classes", "label_name"),
-        ("units", "unit_id"),
-        ("specimens", "specimen_id"),
+        ("machines", "unit_id"),
+        ("sets of gears", "specimen_id"),
         ("states", "status"),
     ):
         lines.append(f"  {title:<12} {_counts(data.column(column))}")

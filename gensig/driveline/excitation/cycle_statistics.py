@@ -1,7 +1,7 @@
 """Statistics over the cycles of the crank of a motion that does not repeat.
 
 A drive that rattles is chaotic: its extremes over a run grow with the run and depend on the last
-bit. Medians over the cycles and amplitudes at the half orders are sound to a few per cent after
+bit. Medians over the cycles and amplitudes at the half orders are right to a few per cent after
 some cycles.
 """
 

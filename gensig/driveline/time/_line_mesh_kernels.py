@@ -110,7 +110,7 @@ def gather(meshes, mesh, flank, turned, within, pairs):
 
 @compiled
 def flank_law(pairs, depth, damping, shared, within, rate, roll_rate):
-    """Law of the gathered pairs of a flank, ``within`` m beyond where sound teeth touch; their
+    """Law of the gathered pairs of a flank, ``within`` m beyond where healthy teeth touch; their
     springs begin at ``depth`` (spring,) m beyond the gap.
 
     Sets the normal force of every pair, where there is any force.

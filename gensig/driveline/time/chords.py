@@ -33,7 +33,7 @@ def sliced_pair_mesh(
 
     ``start_phase`` is that of the slice that enters first, and ``tilts`` (tooth,) m/m are 0 where
     the middle of the face is at the pitch point. What the teeth of a pair have in
-    common is that of ``pair_mesh``; the back flanks are those of sound teeth, whose slices enter
+    common is that of ``pair_mesh``; the back flanks are those of healthy teeth, whose slices enter
     from the other end.
 
     The force of a pair is made of chords between fixed depths of bite D_l and is convex, so that

@@ -240,7 +240,7 @@ def pair_mesh(
     """A spur mesh of our own tables; gear a is the pinion. The law is that of the pair dynamics.
     ``tilts`` (tooth,) are in m/m, as those of the pair.
 
-    The back flanks are sound teeth without errors, mirrored as the pair dynamics mirrors them; a
+    The back flanks are healthy teeth without errors, mirrored as the pair dynamics mirrors them; a
     missing tooth is missing there too.
     """
     pair, kinds = table.pair, (table.pinion.kind, table.wheel.kind)

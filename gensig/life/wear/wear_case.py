@@ -38,7 +38,7 @@ ERROR_PHASES = 32
 class WearCase:
     """Pair under one torque with its wear law; made by ``wear_case``.
 
-    ``mesh`` has new flanks, modified or not, and sound teeth, which go on bending as such.
+    ``mesh`` has new flanks, modified or not, and healthy teeth, which go on bending as such.
     ``loads`` and ``period`` (over one mesh period) are its prepared contact, None where one pair
     carries everything.
     """

@@ -34,11 +34,11 @@ NEWTON_STEPS = 40
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GearSlices:
-    """One gear's teeth in slices, by kind; kind 0 is sound, with zeros only.
+    """One gear's teeth in slices, by kind; kind 0 is healthy, with zeros only.
 
     Parameters
     ----------
-    softening : (kind, slice, node) m2/N    structural compliance above the sound tooth's, per width
+    softening : (kind, slice, node) m2/N    structural compliance beyond a healthy tooth, per width
     gap : (kind, slice, node) m             of its flank; ``NO_FLANK`` where it is missing
     present : (kind,)
     kind : (tooth,)
@@ -104,7 +104,7 @@ def slices_of_gears(
     Parameters
     ----------
     teeth : the faulty teeth, by (gear, tooth)
-    structure : (node,) m2/N    of sound pairs per width, less the shared compliance
+    structure : (node,) m2/N    of healthy pairs per width, less the shared compliance
     """
     position = node_positions(pair, options)
     flanks = flank_sides(pair, position, material, options, 1.0)
@@ -155,7 +155,7 @@ def _softening(
     edges: Array,
     structure: Array,
 ) -> Array:
-    """Compliance above the sound tooth's per width, (slice, node) m2/N."""
+    """Compliance above the healthy tooth's per width, (slice, node) m2/N."""
     in_plane, gear = material.in_plane(options.elasticity), tooth.gear
     nodes = np.stack([flank.curvature, structure])
     (curvature, rest), inverse = np.unique(nodes, axis=1, return_inverse=True)
@@ -242,7 +242,7 @@ def _strips(
 def _scaled(local: Array, whole: Array, rest: Array, width: Array) -> Array:
     """Compliance of the crack in every slice, scaled to that of the whole crack.
 
-    A crack over part of the width is stiffened by the sound tooth next to it. One factor scales
+    A crack over part of the width is stiffened by the healthy tooth next to it. One factor scales
     all slices. With it, slices in parallel, each of compliance ``rest`` plus its part of the
     crack, have the compliance ``rest`` plus the calibrated compliance of the whole crack.
 

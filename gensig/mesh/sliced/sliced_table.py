@@ -75,7 +75,7 @@ class SlicedTable:
     depth : (chord,) m        beginning with 0
     compliance, compliance_slope, gap, gap_slope : (pinion kind, wheel kind, chord, node)
         m/N, 1/N, m, 1
-    pinion_kind, wheel_kind : (tooth,)    kind of every tooth; 0 is sound
+    pinion_kind, wheel_kind : (tooth,)    kind of every tooth; 0 is healthy
     pinion_present, wheel_present : (kind,)
     shared_compliance : m/N   body compliance that all pairs share
     set_chord : chord of the mean load at the set torque, for uses that need one spring
@@ -221,7 +221,7 @@ def _all_curves(
     frame = _frame(setting)
     first = np.empty((len(pinion), len(wheel), len(frame.position)))
     loads = np.empty((*first.shape, len(frame.depth)))
-    # no tooth need be of the sound kind, but the back flanks are sound
+    # no tooth need be of the sound kind, but the back flanks are healthy
     sound_met = 0 in pinion_kind and 0 in wheel_kind
     first[:], loads[:] = _curves(setting, *_healthy(setting.pair), sound_met)
     for a in np.unique(pinion_kind):

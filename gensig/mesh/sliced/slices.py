@@ -204,7 +204,7 @@ def _structure(
     options: MeshOptions,
     hot_teeth: PaperGrowth | None,
 ) -> tuple[Array, float]:
-    """Unshared compliance of sound teeth and bodies per width (node,) m2/N, and shared, m/N."""
+    """Unshared compliance of healthy teeth and bodies per width (node,) m2/N, and shared, m/N."""
     clipped = np.clip(node_positions(pair, options), 0.0, pair.path_of_contact)
     on_path, inverse = np.unique(clipped, return_inverse=True)
     in_plane = material.in_plane(options.elasticity)
