@@ -73,7 +73,7 @@ def is_blank(out: Path) -> bool:
     if not out.is_dir() or out.is_symlink():
         return not os.path.lexists(out)
     kept = out / FINISHED_JOBS
-    if kept.is_symlink() or any(kept.glob("[!.]*")):
+    if kept.is_symlink() or any(kept.glob("*.json")):
         return False
     others = [path for path in out.iterdir() if path != kept]
     return all(path.match(f".{STUDY}.*{TEMPORARY_SUFFIX}") for path in others)
@@ -178,7 +178,7 @@ def study_at_work(out: Path, config: Configuration) -> Iterator[Path]:
         try:
             yield jobs
         except Exception:
-            if not any(jobs.glob("[!.]*")):
+            if not any(jobs.glob("*.json")):
                 (out / STUDY).unlink(missing_ok=True)
                 shutil.rmtree(jobs, ignore_errors=True)
             raise

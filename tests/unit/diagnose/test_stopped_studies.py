@@ -99,7 +99,7 @@ class Brief:
         with study_at_work(out, config) as kept:
             if self.error is not None:
                 raise self.error
-            (kept / "a.npz").touch()
+            (kept / "a.json").touch()
             self.left -= 1
             if self.left < 0:
                 raise KeyboardInterrupt
