@@ -27,13 +27,9 @@ from gensig.errors import SimulationError
 
 SIZES = {"n_units": 8, "records_per_unit": 4, "duration": 0.2}
 BRIEF = (*FAST, *NETWORK_ONLY, "epochs=1", "n_bootstrap=20", "epoch_fraction=0.1")
-OPEN = "protocols=[healthy_only,open_set]"
 STUDIES = {
-    "classes": (
-        FakeDataset(**SIZES),
-        (*FAST, "epochs=1", "protocols=[by_unit]", "baselines=[rms_threshold]"),
-    ),
-    "novelty": (OpenDataset(**SIZES), (*BRIEF, OPEN)),
+    "classes": (FakeDataset(**SIZES), (*BRIEF, "seeds=[0,1]")),
+    "novelty": (OpenDataset(**SIZES), (*BRIEF, "protocols=[open_set]")),
     "lives": (FakeLives(n_lives=8), (*LIFE, "epochs=1", "protocols=[by_unit]")),
 }
 
