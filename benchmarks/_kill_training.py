@@ -8,7 +8,6 @@ everything, half of them with two workers, which import everything again.
 from __future__ import annotations
 
 import json
-import multiprocessing
 import os
 import random
 import signal
@@ -19,6 +18,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import count, cycle
 from pathlib import Path
+from typing import NoReturn
 
 import diagnose.commands.resume
 import diagnose.report.page
@@ -74,19 +74,26 @@ class Study:
         folder.mkdir(exist_ok=True)
         words = ["train", f"data={data}", f"out={OUT}", *STUDY_WORDS]
         words.append(f"n_threads={mode.n_threads}")
-        self._process = multiprocessing.get_context("fork").Process(
-            target=_run, args=(words, folder, self.told, mode.is_command)
-        )
-        self._process.start()
-        assert self._process.pid is not None
-        self.group = self._process.pid
+        self.told.unlink(missing_ok=True)
+        self._status: int | None = None
+        self.group = os.fork()
+        if self.group == 0:
+            _run(words, folder, self.told, mode.is_command)
         while self.wait(0.001) is None and not self.told.exists():
             pass
 
     def wait(self, seconds: float) -> int | None:
         """Exit status, negative for a signal; None where it still runs after that time."""
-        self._process.join(seconds)
-        return self._process.exitcode
+        deadline = time.monotonic() + seconds
+        while self._status is None:
+            ended, status = os.waitpid(self.group, os.WNOHANG)
+            if ended:
+                self._status = os.waitstatus_to_exitcode(status)
+            elif time.monotonic() >= deadline:
+                break
+            else:
+                time.sleep(min(seconds, 0.005))
+        return self._status
 
     def stop(self, number: signal.Signals, *, of_group: bool) -> int | None:
         """Send a signal; returns the exit status, None for a run that does not end."""
@@ -96,7 +103,8 @@ class Study:
         return self.wait(LONGEST)
 
 
-def _run(words: list[str], folder: Path, told: Path, is_command: bool) -> None:
+def _run(words: list[str], folder: Path, told: Path, is_command: bool) -> NoReturn:
+    """Run in a child of this process, which ends here."""
     os.setsid()
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.chdir(folder)
@@ -106,9 +114,12 @@ def _run(words: list[str], folder: Path, told: Path, is_command: bool) -> None:
     if is_command:
         os.execv(sys.executable, [sys.executable, "-m", "diagnose.cli", *words])
     sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)
-    status = diagnose(words)
-    sys.stderr.flush()
-    os._exit(status)
+    status = 70
+    try:
+        status = diagnose(words)
+        sys.stderr.flush()
+    finally:
+        os._exit(status)
 
 
 def contents(out: Path) -> dict[str, bytes]:
