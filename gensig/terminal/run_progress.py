@@ -12,7 +12,7 @@ from gensig.terminal.printing import tell
 from gensig.text.amounts import duration_text, size_text
 
 LINE_SECONDS = 5.0
-COMPILING = "compiling, once for this kind of machine: up to a minute"
+COMPILING = "compiling, once for this kind of machine: half a minute of a core"
 STARTING = "workers start"
 LEAST_COMPILING = 1.0  # seconds of which a line is told
 
