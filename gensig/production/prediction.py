@@ -84,7 +84,7 @@ def predict(
         **_references(table),
         "classes": ", ".join(f"{name} {count:,}" for name, count in classes.items()),
         "machines": f"{n_different(table, 'unit_id'):,}",
-        "sets of gears": f"{n_different(table, 'specimen_id'):,}",
+        "gears": f"{n_different(table, 'specimen_id'):,} set(s)",
         "gearboxes": f"{n_different(table, 'gearbox_id'):,}",
         "conditions": f"{n_different(examples, 'condition_id'):,}",
         "design": describe_design(config),

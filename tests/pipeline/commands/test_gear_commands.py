@@ -42,11 +42,11 @@ def test_stiffness_json_has_the_promised_keys(written, drawn):
     assert mean == pytest.approx(np.mean(mesh), rel=1e-12)
     panels = drawn[0]
     assert labels(panels["One pair carrying the whole load"]) == [
-        "sound pair",
+        "healthy pair",
         "crack pair",
     ]
     assert labels(panels["Mesh stiffness over one revolution"]) == [
-        "sound",
+        "healthy",
         "with crack",
         "its tooth in contact",
     ]
@@ -73,7 +73,9 @@ def test_own_config_dir_adds_options(gensig, tmp_path):
     (tmp_path / "fault" / "deep.yaml").write_text(option)
     said, _ = gensig("stiffness fault=deep --config-dir .")
     assert "faulty pair loses" in said
-    result = re.search(r"single pair, highest +(\S+) N/m sound, (\S+) N/m faulty", said)
+    result = re.search(
+        r"single pair, highest +(\S+) N/m healthy, (\S+) N/m faulty", said
+    )
     assert result is not None
     assert 0.5 < float(result[2]) / float(result[1]) < 1.0
 
@@ -127,7 +129,7 @@ def test_a_fault_is_shown_over_the_periods_that_see_it(written, drawn, capsys):
     assert n_phases == len(content["fault_adds_um"]) == 8 * 64
     assert max(content["fault_adds_um"]) > 0.5
     assert "the fault adds             0 .. 0." in capsys.readouterr().out
-    assert {"pair of faulty teeth", "sound pairs"} <= {
+    assert {"pair of faulty teeth", "healthy pairs"} <= {
         *labels(drawn[0]["Load sharing"])
     }
     assert "Load over the faulty flanks" in drawn[0]
@@ -137,7 +139,7 @@ def test_a_fault_is_shown_over_the_periods_that_see_it(written, drawn, capsys):
     sound = min(content["sound_mesh_stiffness_n_per_m"])
     assert min(content["mesh_stiffness_n_per_m"]) < 0.97 * sound
     assert "the mesh loses" in capsys.readouterr().out
-    assert labels(drawn[1]["Mesh"]) == ["sound", "faulty"]
+    assert labels(drawn[1]["Mesh"]) == ["healthy", "faulty"]
 
 
 def test_a_modification_too_deep_to_close_is_a_warning(gensig):

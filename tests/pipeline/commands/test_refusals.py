@@ -166,7 +166,7 @@ REFUSED = {
     "gensig plan gear.addendum_coefficient=0.5": "below 1",
     "gensig generate gear.addendum_coefficient=0.5 out=x": "below 1",
     # slices and heat
-    f"{FLANK} --out best.yaml fault=crack": "a modification is for sound flanks",
+    f"{FLANK} --out best.yaml fault=crack": "a modification is for healthy flanks",
     f"{FLANK} --out best.txt": "give a file NAME.yaml",
     f"{FLANK} --out best.yaml --points 0": "--points 0",
     f"{FLANK} --out best.yaml --torques -1": "must be positive",
@@ -194,7 +194,7 @@ REFUSED = {
     f"gensig stiffness {HOT} mesh.friction_coefficient=0.5": "data, -75 to 300 degrees",
     f"gensig stiffness {HOT} heat.housing_temperature_degc=0": "the gears jam",
     # root stress
-    "gensig root-stress fault=crack": "root stress is that of sound teeth",
+    "gensig root-stress fault=crack": "root stress is that of healthy teeth",
     "gensig root-stress --stress -1": "give a positive one",
     "gensig root-stress --stress nan": "give a positive one",
     "gensig root-stress operating.torque_nm=0": "operating.torque_nm = 0 must be positive",
@@ -219,7 +219,7 @@ REFUSED = {
         "at 30 N m of the map: wear.transmission_error_limit_um"
     ),
     "gensig wear-life wear=rust": "no option 'rust' of wear; there is archard",
-    "gensig wear-life fault=wear": "a life begins with sound flanks",
+    "gensig wear-life fault=wear": "a life begins with healthy flanks",
     "gensig wear-life operating.speed_rpm=0": "speed",
     "gensig wear-life --out 'mine/worn wheel.yaml'": "NAME without spaces",
     "gensig wear-life --torques 50": "a map needs two torques or more",
@@ -255,7 +255,7 @@ REFUSED = {
     f"gensig modes {TRAIN} system.gears_csv=null": "needs a table of gears; give system.gears_csv",
     f"gensig modes {TRAIN} system.shafting_csv=engine_gears": "column face_width_mm: unknown",
     f"gensig modes {TRAIN} system.viscous_damper_node=99": "has no such node",
-    "gensig modes fault=crack": "modes are those of sound teeth",
+    "gensig modes fault=crack": "modes are those of healthy teeth",
     f"{DAMPERS}5": "system.dampers = 5 must be a list of dampers, [] for none",
     f"{DAMPERS}[7]": "system.dampers[0] = 7 must be a group of keys",
     damper(node=99): "system.dampers: node 99 is not in the shaft line; it has 1 to 67",

@@ -60,7 +60,7 @@ def test_card_and_plan_tell_both_numbers(folders):
     words = ["plan.n_records=6", "plan.classes=[healthy,crack]", *WORDS]
     facts = predict(read_request([*words, "operating.duration_s=0.02"]).config)
     assert facts["records"] == "6"
-    assert facts["references"] == "6 more (2 a unit, sound, in no split)"
+    assert facts["references"] == "6 more (2 a machine, healthy, in no split)"
     assert sorted(facts["classes"].split(", ")) == ["crack 3", "healthy 3"]
     assert facts["conditions"] == "3"
 

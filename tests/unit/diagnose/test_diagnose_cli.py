@@ -189,7 +189,7 @@ def evaluating(trained, name="other"):
 def test_evaluate_on_another_data_set_takes_all_records(trained, data, capsys):
     data["other"] = fake(seed=9)
     shown = says(capsys, *evaluating(trained))
-    assert shown.startswith("64 records of 16 unit(s): all records")
+    assert shown.startswith("64 records of 16 machine(s): all records")
 
 
 OTHER_CLASSES = ("healthy", "crack", "pitting", "broken")

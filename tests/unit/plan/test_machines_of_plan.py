@@ -57,7 +57,7 @@ def test_a_number_of_gearboxes_contradicts_machines_of_their_own():
     with pytest.raises(ConfigError) as caught:
         planned(*SHORT, OWN, "plan.n_gearboxes=4")
     assert str(caught.value) == (
-        "plan.n_gearboxes = 4: with plan.machines=separate every unit has a gearbox of its own; "
+        "plan.n_gearboxes = 4: with plan.machines=separate every machine has a gearbox of its own; "
         "give plan.n_gearboxes=null"
     )
 

@@ -140,7 +140,7 @@ class TestGrid:
         [
             (
                 {"n_records": 400},
-                "plan.n_records = 400, but the plan has 60 records (5 units x 3 conditions x 4 "
+                "plan.n_records = 400, but the plan has 60 records (5 machines x 3 conditions x 4 "
                 "classes); plan.n_records=null takes them",
             ),
             (
@@ -153,8 +153,8 @@ class TestGrid:
             ),
             (
                 {"vary": speed(MANY)},
-                "the grid has 2,000,000 records (5 units x 100,000 conditions x 4 classes), more "
-                "than 1,000,000; take fewer levels, units or repeats",
+                "the grid has 2,000,000 records (5 machines x 100,000 conditions x 4 classes), more "
+                "than 1,000,000; take fewer levels, machines or repeats",
             ),
             (
                 {"conditions_per_unit": 2},
@@ -171,7 +171,10 @@ class TestGrid:
         ("levels", "text"),
         [
             (1, "fault.vary.crack_depth_mm: levels = 1"),
-            (10**6, r"20,000,000 records \(5 units x 1,000,000 faults x 4 classes\)"),
+            (
+                10**6,
+                r"20,000,000 records \(5 machines x 1,000,000 faults x 4 classes\)",
+            ),
         ],
     )
     def test_mistakes_in_a_fault_are_named(self, planned, levels, text):

@@ -201,7 +201,7 @@ class TestRefusals:
             ({"conditions_per_unit": 0}, "plan.conditions_per_unit = 0"),
             (
                 {"conditions_per_unit": 3, "n_repeats": 2},
-                "plan.n_records = 8, but the plan has 960 records (40 units x 3 conditions x 4 "
+                "plan.n_records = 8, but the plan has 960 records (40 machines x 3 conditions x 4 "
                 "classes x 2 repeats); plan.n_records=null takes them",
             ),
             ({"n_reports": 3}, "unknown key 'n_reports'; it has n_records, n_units"),

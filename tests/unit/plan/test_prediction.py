@@ -62,8 +62,8 @@ def test_what_a_grid_holds_is_told():
     told = foretold("a grid")
     assert told["records"] == "24"
     assert told["classes"].count(" 6") == 4
-    assert (told["units"], told["conditions"], told["repeats"]) == ("2", "6", "1")
-    assert (told["specimens"], told["gearboxes"]) == ("2 (sets of gears)", "1")
+    assert (told["machines"], told["conditions"], told["repeats"]) == ("2", "6", "1")
+    assert (told["gears"], told["gearboxes"]) == ("2 set(s)", "1")
     assert told["design"].startswith(
         "grid of operating.speed_rpm 3; drawn: crack.tooth, crack.crack_depth_mm"
     )

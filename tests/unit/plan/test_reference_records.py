@@ -129,12 +129,12 @@ def test_the_check_finds_a_reference_in_a_split(name):
     [
         (
             ("plan.classes=[crack,pitting]", "plan.n_reference=2"),
-            "plan.n_reference = 2: reference records are sound, but no class of plan.classes "
+            "plan.n_reference = 2: reference records are healthy, but no class of plan.classes "
             "[crack, pitting] is; add healthy, or give 0",
         ),
         (
             ("experiment=run_to_failure", "plan.n_reference=1"),
-            "plan.n_reference = 1: lives have no reference records; a unit is new at its first "
+            "plan.n_reference = 1: lives have no reference records; a machine is new at its first "
             "snapshot: give 0",
         ),
         (
@@ -142,7 +142,7 @@ def test_the_check_finds_a_reference_in_a_split(name):
             "plan.n_reference = -1 must be a whole number of at least 0",
         ),
     ],
-    ids=["no sound class", "lives", "negative"],
+    ids=["no healthy class", "lives", "negative"],
 )
 def test_what_cannot_be_is_refused(words, text):
     with pytest.raises(ConfigError) as caught:

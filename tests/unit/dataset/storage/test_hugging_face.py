@@ -302,7 +302,8 @@ def test_a_set_without_a_clean_split_says_why(tmp_path):
     folder = build(tmp_path / "set", every_protocol_plan(n_records=3), references=True)
     for protocols in (None, ["all"]):
         with pytest.raises(
-            DatasetError, match=r"no split that keeps units apart \(1 uni"
+            DatasetError,
+            match=r"no split that keeps machines apart \(the plan has 1 mach",
         ):
             export(folder, "hf", tmp_path / "hub", protocols=protocols)
     assert export(folder, "npz", tmp_path / "x.npz")["records"] == 3

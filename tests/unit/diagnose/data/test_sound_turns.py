@@ -138,7 +138,7 @@ def test_a_machine_without_a_second_sound_record_is_refused(dataset):
     task, settings = study_of(dataset, *OPTIONS)
     task.dataset.columns["fault_gear"][0] = "pinion"
     inputs = Turns.of(with_reference(settings).model)
-    with pytest.raises(ConfigError, match="record 0 has no sound record"):
+    with pytest.raises(ConfigError, match="record 0 has no healthy record"):
         inputs.load(task, all_segments(task))
     task.dataset.columns["fault_gear"][0] = ""
 

@@ -30,7 +30,7 @@ def test_the_score_on_new_machines_comes_first():
     both = metrics_with("new_machine", with_reference=score(0.85))
     assert headlines(both) == [
         line,
-        "unknown machine with one sound record of its own from another condition: "
+        "unknown machine with one healthy record of its own from another condition: "
         "balanced accuracy 0.85 [0.75, 0.95], chance 0.25",
     ]
 

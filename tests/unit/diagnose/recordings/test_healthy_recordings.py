@@ -28,7 +28,7 @@ def test_scores_with_and_without_a_sound_record_stand_side_by_side(tooth_study):
     assert {"tooth", "with_reference"} <= set(methods)
     names = {path.name for path in (tooth_study / "models").iterdir()}
     assert names == {"by_unit-seed0", "by_unit-with_reference-seed0"}
-    assert "network with a sound record" in (tooth_study / "report.html").read_text()
+    assert "network with a healthy record" in (tooth_study / "report.html").read_text()
 
 
 def predicted(capsys, *words):

@@ -71,4 +71,4 @@ def test_evaluate_takes_it_where_no_model_is_given(stream, tmp_path, capsys):
     counts = ("plan.n_records=8", "plan.n_units=2", "operating.duration_s=0.8")
     gensig.generate("experiment=many_machines", *counts, "seed=78", out=out)
     shown = says(capsys, "evaluate", f"data={out}")
-    assert "8 records of 2 unit(s): all records" in shown
+    assert "8 records of 2 machine(s): all records" in shown

@@ -124,7 +124,7 @@ LOAD = "{distribution: uniform, low: 2, high: 5, of: unit_load}"
     [
         (
             [SPUR_GEAR],
-            "'gear.pinion.n_teeth' is drawn once a unit, but with plan.machines=crossed",
+            "'gear.pinion.n_teeth' is drawn once a machine, but with plan.machines=crossed",
         ),
         (
             [SPUR_GEAR, *SEPARATE, "experiment=two_stage"],
@@ -153,7 +153,7 @@ LOAD = "{distribution: uniform, low: 2, high: 5, of: unit_load}"
                 *SEPARATE,
                 "plan.vary={gear.pinion.n_teeth: {distribution: integers, low: 5, high: 9}}",
             ],
-            "none of 100 designs drawn for unit 0 can be made",
+            "none of 100 designs drawn for machine 0 can be made",
         ),
         (
             [SPUR_GEAR, *SEPARATE, "operating.turns=5", "plan.fault_gear=drawn"],
