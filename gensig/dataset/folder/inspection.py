@@ -106,7 +106,7 @@ def _dataset_lines(data: Dataset) -> list[str]:
     for title, column in (
         ("classes", "label_name"),
         ("machines", "unit_id"),
-        ("gears", "specimen_id"),
+        ("gear sets", "specimen_id"),
         ("states", "status"),
     ):
         lines.append(f"  {title:<12} {_counts(data.column(column))}")

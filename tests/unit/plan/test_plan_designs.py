@@ -153,8 +153,8 @@ class TestGrid:
             ),
             (
                 {"vary": speed(MANY)},
-                "the grid has 2,000,000 records (5 machines x 100,000 conditions x 4 classes), more "
-                "than 1,000,000; take fewer levels, machines or repeats",
+                "the grid has 2,000,000 records (5 machines x 100,000 conditions x 4 classes), "
+                "more than 1,000,000; take fewer levels, machines or repeats",
             ),
             (
                 {"conditions_per_unit": 2},
