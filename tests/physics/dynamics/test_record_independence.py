@@ -80,9 +80,14 @@ def test_what_was_read_before_leaves_the_teeth_of_another_set(config, rows, word
     def teeth(given):
         return pickle.dumps(InputReader(given).inputs(rows[0]).run.specimen)
 
-    first, other = teeth(config), teeth(read_request([*WORDS, word]).config)
+    another = read_request([*WORDS, word]).config
+    first, other = teeth(config), teeth(another)
     assert other != first
     assert teeth(config) == first
+    simulate_record(config, rows[0])  # with the twin that sets its noise
+    row = make_plan(another).record(0)
+    assert row["condition_id"] == rows[0]["condition_id"]
+    assert_same([simulate_record(another, row)], simulated(another, [row]))
 
 
 def test_a_failure_leaves_its_block(config, rows, in_order):

@@ -1,4 +1,7 @@
-"""Folders that change while a run is going on, or after it: named by the run, mended by resume."""
+"""Folders that change while a run is going on, or after it: named by the run, mended by resume.
+
+The run looks at them in `gensig.production.run_check`.
+"""
 
 import json
 import os

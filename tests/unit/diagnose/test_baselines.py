@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from small_studies import task_on, train, windows_of
 
 from diagnose.baselines.base import Baseline, MethodText, Parts, Role, Source
-from diagnose.baselines.features import FeatureTable
+from diagnose.baselines.features import FEATURES, FeatureTable
 from diagnose.baselines.indicator_models import INDICATOR_INPUT
 from diagnose.baselines.registry import BASELINES, baseline_names
 from diagnose.data.windows import SUBSETS
@@ -48,6 +48,19 @@ def parts_of(source):
         return made[baseline.reads]
 
     return parts
+
+
+@pytest.mark.parametrize("features", FEATURES)
+def test_a_table_has_the_chosen_indicators_of_each_channel(source, features):
+    chosen = replace(source, features=features, caches={})
+    names = INDICATOR_INPUT.make(chosen).test.names
+    wanted = {
+        f"{channel}_{name}"
+        for channel in source.task.channel_names
+        for name in FEATURES[features]
+    }
+    assert len(names) == len(wanted)
+    assert {name.replace("/", "_") for name in names} == wanted
 
 
 def fitted(baseline, parts):

@@ -13,6 +13,7 @@ from gensig.implants.gearing import Gearing
 from gensig.implants.implanting import Implanter, implant_records
 from gensig.implants.options import RESIDUALS, ImplantOptions
 from gensig.implants.simulated_pairs import CLASSES, HEALTHY, MANY_TEETH, ONE_TOOTH
+from gensig.implants.stretching import FADE, REACH, Played
 from gensig.signals.indicators import kurtosis
 
 SMALL = ImplantOptions(n_records=72, path="none", duration=0.45, plain_healthy=0.0)
@@ -98,6 +99,21 @@ def test_python_has_the_defaults_of_the_command():
     assert len(names) >= 7
     for name in names:
         assert given[name].default == getattr(ImplantOptions(), name), name
+
+
+def test_a_loop_plays_the_signal_and_fades_at_its_seam():
+    turned = np.arange(2001) / 100.0
+    signal = np.sin(0.3 * turned)[None]
+    played = Played(signal, turned, per_turn=100.0)
+    begin, n_turns = REACH / 100.0, played.n_turns
+    turns = np.linspace(FADE, n_turns - 1e-6, 1000)
+    for loop in range(3):
+        expected = np.sin(0.3 * (begin + turns))
+        found = played.at(turns + loop * n_turns)[0]
+        np.testing.assert_allclose(found, expected, atol=1e-3)
+    assert abs(found[-1] - found[0]) > 0.2  # so that the ends of a loop differ
+    seam = n_turns + np.linspace(-FADE, FADE, 401)
+    assert np.abs(np.diff(played.at(seam)[0])).max() < 0.01
 
 
 def test_starts_gears_and_channels_tell_no_class(pairs, healthy):

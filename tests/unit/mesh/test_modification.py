@@ -7,7 +7,11 @@ import pytest
 from closeness import assert_close
 
 from gensig.errors import ConfigError
-from gensig.mesh.modification import FlankModification, PairModification
+from gensig.mesh.modification import (
+    FlankModification,
+    PairModification,
+    sound_teeth,
+)
 from gensig.options.compose import compose
 from gensig.systems.registry import read_modification, read_pair
 
@@ -37,6 +41,15 @@ def at(pair, modification, n_slices=5):
         place,
         modification.deviation(pair, position, place),
     )
+
+
+def test_every_pair_has_its_own_modified_teeth():
+    relieved = FlankModification(tip_relief=8 * MICRO, tip_relief_height=0.5 * MILLI)
+    modification = of_pair(pinion=relieved)
+    for gear in ("xiamen_23_84", "fzg_c_16_24", "xiamen_23_84"):
+        pair = read_pair(compose("generate", [f"gear={gear}"]))
+        teeth = sound_teeth(pair, modification)
+        assert {side: tooth.gear for side, tooth in teeth.items()} == pair.gears
 
 
 @pytest.mark.parametrize("shape", ["linear", "parabolic"])

@@ -2,6 +2,7 @@
 
 import datetime
 import json
+from types import SimpleNamespace
 
 import mlcroissant
 import numpy as np
@@ -10,7 +11,7 @@ import yaml
 from dataset_samples import CLASSES, build, make_plan
 from numpy.testing import assert_allclose
 
-from gensig.dataset.cards.card import card_text, front_matter
+from gensig.dataset.cards.card import card_text, class_rows, front_matter
 from gensig.dataset.cards.croissant import _meaning
 from gensig.dataset.columns import COLUMNS
 from gensig.dataset.reader import open_dataset
@@ -39,6 +40,21 @@ def test_front_matter(folder):
 def test_size_category(data, n_records, expected):
     data.n_records = n_records
     assert _front(front_matter(data) + "\n")["size_categories"] == [expected]
+
+
+def test_classes_are_listed_in_their_order_with_those_that_have_records():
+    names = np.array(["wear", "healthy", "wear", "healthy", "odd", "crack"])
+    columns = {"label_name": names, "severity": np.arange(6.0)}
+    data = SimpleNamespace(
+        class_names=["wear", "healthy", "crack", "pitting"],
+        is_reference=np.arange(6) == 5,
+        column=columns.get,
+    )
+    assert class_rows(data) == [
+        ("wear", 2, "0 to 2"),
+        ("healthy", 2, "1 to 3"),
+        ("odd", 1, "4"),
+    ]
 
 
 def test_hostile_names_stay_text(tmp_path, plan):

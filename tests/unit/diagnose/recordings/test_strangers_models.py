@@ -6,6 +6,7 @@ import shutil
 
 import numpy as np
 import pytest
+from refusals import refused
 from safetensors.numpy import load_file, save_file
 
 import diagnose.networks.registry
@@ -114,6 +115,16 @@ def test_weights_that_give_no_finite_answer_are_refused_even_signed(cnn, value):
     save_file(tensors, cnn / "model.safetensors")
     forge(cnn)
     with pytest.raises(DatasetError, match="not finite"):
+        open_network(cnn)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_one_weight_that_is_not_finite_names_its_tensor(cnn, value):
+    tensors = dict(load_file(cnn / "model.safetensors"))
+    tensors["head.1.weight"].flat[-1] = value
+    save_file(tensors, cnn / "model.safetensors")
+    forge(cnn)
+    with refused("tensor 'head.1.weight' holds numbers that are not", DatasetError):
         open_network(cnn)
 
 

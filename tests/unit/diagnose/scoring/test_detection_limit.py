@@ -184,6 +184,20 @@ def test_a_known_limit_lies_in_the_interval(cracks, validation):
     assert "crack_depth_mm" in crack["summary"]
 
 
+def test_the_share_of_resamples_is_of_the_resamples_alone():
+    """The scores as they are lead the rows of values, and are none of them."""
+    rng = default_rng(0)
+    unit = np.repeat(np.arange(8), 10)
+    label = np.arange(unit.size) % 2
+    severity = rng.uniform(0.1, 0.9, unit.size)
+    score = rng.normal(size=(1, unit.size)) + label * (6 * severity - 3)
+    test = judged(score, label, unit)
+    limits_of = answer(test, None, severity[label == 1])["classes"]["crack"]["limits"]
+    counts = [200 * row["share_of_resamples_reached"] for row in limits_of]
+    assert any(20 < count < 180 for count in counts)
+    assert_allclose(counts, np.round(counts), atol=1e-9)
+
+
 def test_perfect_blind_and_equal_scores(cracks):
     label = cracks[0].label
     perfect = crack_with(100.0 * label, cracks)

@@ -23,6 +23,7 @@ from diagnose.baselines.indicator_models import (
 )
 from diagnose.baselines.rms_threshold import RmsThreshold
 from diagnose.data.windows import subset_segments, task_of
+from diagnose.report.novelty_report import novelty_caveats
 from diagnose.report.page import without_interval
 from diagnose.report.text import score_cell
 from diagnose.scoring.machines import LEAST_UNITS
@@ -276,3 +277,14 @@ def test_rms_threshold_uses_the_level_only(names, low, high):
     detail, _, scores = fit_and_score(RmsThreshold(), Parts.of(lambda _: table))
     assert low <= (scores.argmax(axis=1) == label).mean() <= high
     assert detail.startswith("thresholds 1.") == (low == 1.0)
+
+
+def test_the_scarcest_groups_of_a_novelty_test_are_told():
+    """Of machines and units, those of which there are fewest, whatever their names."""
+    result = {"n_records": {"validation": 1000}, "resampled": {}}
+    for kinds in (("machines", "units"), ("units", "machines")):
+        result["resampled"] = dict(zip(kinds, (12, 3), strict=True))
+        (line,) = novelty_caveats({"new_class": result}, few_units=10)
+        assert line.startswith(f"new_class: only 3 {kinds[1]} in the test part")
+    result["resampled"] = {"machines": 12, "units": 10}
+    assert novelty_caveats({"new_class": result}, few_units=10) == []
