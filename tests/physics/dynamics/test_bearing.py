@@ -51,6 +51,20 @@ BOTH = pytest.mark.parametrize(
 LOADS = pytest.mark.parametrize("load", [20.0, 460.0, 5000.0])
 
 
+def test_a_ball_s_coefficient_is_that_of_its_bearing_and_material():
+    """Whatever was asked before; Hertz: it grows with the root of the size and with E."""
+    double = replace(
+        SMALL,
+        ball_diameter=2 * SMALL.ball_diameter,
+        pitch_diameter=2 * SMALL.pitch_diameter,
+    )
+    stiff = replace(STEEL, youngs_modulus=2 * STEEL.youngs_modulus)
+    first = ball_coefficient(SMALL, STEEL)
+    assert_close(ball_coefficient(double, STEEL), math.sqrt(2.0) * first, 1e-9)
+    assert_close(ball_coefficient(SMALL, stiff), 2.0 * first, 1e-9)
+    assert ball_coefficient(SMALL, STEEL) == first
+
+
 def equilibrium(bearing, load, *angles):
     positions = np.array(angles) if angles else cage_positions(bearing)
     return bearing_equilibrium(bearing, STEEL, load, positions)

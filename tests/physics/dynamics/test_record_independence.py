@@ -74,7 +74,7 @@ def test_records_are_independent_in_any_order_and_block(config, rows, in_order, 
 @pytest.mark.parametrize(
     "word", ["seed=1", "quality.iso1328_grade=9", "gear=fzg_c_16_24"]
 )
-def test_what_was_read_before_leaves_the_teeth_of_another_set(config, rows, word):
+def test_what_was_read_before_leaves_another_set_as_it_is(config, rows, word):
     """One process reads several sets: one by one, and those of a sweep."""
 
     def teeth(given):

@@ -6,6 +6,7 @@ import sys
 import pytest
 from small_studies import settings_of
 
+from diagnose.commands.train import _expand
 from gensig.errors import ConfigError
 
 WHOLE = "must be a whole number of at least 1"
@@ -65,6 +66,16 @@ REFUSALS = [
 def test_mistakes_are_refused(override, message):
     with pytest.raises(ConfigError, match=message):
         settings_of(override)
+
+
+def test_every_run_of_a_sweep_takes_options_of_one_s_own(tmp_path):
+    folder = tmp_path / "mine" / "model"
+    folder.mkdir(parents=True)
+    (folder / "small.yaml").write_text("name: cnn\nkind: small_cnn\nwidths: [4, 4]\n")
+    words = ["data=a", f"out={tmp_path / 'out'}", "model=glob([cnn,small])"]
+    shipped, small = _expand(words, str(tmp_path / "mine"))
+    assert list(small["model"]["widths"]) == [4, 4]
+    assert list(shipped["model"]["widths"]) != [4, 4]
 
 
 @pytest.mark.parametrize(
