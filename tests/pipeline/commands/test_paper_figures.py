@@ -124,6 +124,9 @@ def test_a_missing_tooth_is_an_impact_a_turn_by_the_papers_equations(written):
         name: np.abs(curves["time", name][1]).max()
         for name in ("the paper's equations", "gensig's default")
     }
+    for name in highest:  # three turns at 1800 r/min
+        time = curves["time", name][0]
+        assert (time[0], time[-1]) == pytest.approx((0.0, 0.1), abs=1e-3)
     assert highest["the paper's equations"] > 1e5
     assert 1e3 < highest["gensig's default"] < 5e3
 
