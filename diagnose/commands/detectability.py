@@ -207,6 +207,8 @@ def _sample(
         )
 
     axes = read_axes(base, numbers["sizes"], numbers["snrs"])
+    for value in axes.sizes:
+        pairs_of(value, axes.snrs_db[0], 0)  # refused before the first line of progress
     edges = read_bandwidths(numbers["bandwidths"], base)
     n_samples = len(axes.sizes) * len(axes.snrs_db)
     with progress(n_samples, "simulating") as on_done:

@@ -84,7 +84,9 @@ class Task:
         ------
         ConfigError    for `CROSS_SENSOR` of a task that has no channels to test on
         """
-        part = replace(self, of_references=subset == REFERENCES)
+        part = self
+        if subset == REFERENCES:
+            part = replace(self, of_references=True)
         if protocol != CROSS_SENSOR:
             return part
         if isinstance(self.cross_channels, str):

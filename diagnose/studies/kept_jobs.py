@@ -141,7 +141,7 @@ def keep_outcomes(kept: KeptJobs, job: Any, outcomes: Sequence[Any]) -> list[Any
     write_text(path.with_suffix(".json"), json.dumps(content, allow_nan=False))
     found = kept_outcomes(kept, job)
     if found is None:
-        raise DatasetError(f"{path}.npz cannot be read back; is the disk sound?")
+        raise DatasetError(f"{path}.npz cannot be read back; check the disk")
     return found
 
 

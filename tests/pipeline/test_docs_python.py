@@ -15,6 +15,7 @@ FOLDERS = ("runs/quick", "runs/first", "runs/traced", "runs/measured", "DIR")
 SMALL = (
     "plan.n_records=20",
     "plan.n_units=10",
+    "plan.machines=separate",
     "sensing.channels=[pinion_x,pinion_y]",
     "operating.duration_s=0.15",
     "dataset.store_tacho=true",

@@ -144,7 +144,7 @@ def test_the_page_stands_alone_and_says_what_matters(trained):
     assert sorted(order, key=text.index) == [*order]
     assert "1-NN" not in text
     sources = re.findall(r'src="([^"]{0,40})', page)
-    assert len(sources) == 6
+    assert len(sources) == 5
     assert all(source.startswith("data:image/png;base64,") for source in sources)
     assert "<script" not in page
     assert outward(page) == []

@@ -21,6 +21,7 @@ from gensig.terminal.warning_lines import one_line_warnings
 
 HOSTILE = "crack\x1b[2K\r\x9b1m\u202e\u2028\nforged: all is whole"
 SHOWN = "crack\\x1b[2K\\r\\x9b1m\\u202e\\u2028\\nforged: all is whole"
+BEGINNING = "[0/1] training; each step tells a line when it is done\n"
 ON_ONE_LINE = SHOWN.replace("\\n", " ")
 
 
@@ -79,7 +80,7 @@ def work():
 )
 def test_what_goes_to_stderr_is_one_line(act, capsys):
     act()
-    printed = capsys.readouterr().err
+    printed = capsys.readouterr().err.removeprefix(BEGINNING)
     assert printed.count("\n") == 1
     assert printed.removesuffix("\n").isprintable()
     assert SHOWN in printed or ON_ONE_LINE in printed

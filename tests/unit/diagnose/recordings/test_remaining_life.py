@@ -360,7 +360,7 @@ def test_the_page_fetches_nothing(browser, life_study):
 
 
 def test_the_report_is_whole(life_study):
-    tables = {"metrics.json", "predictions.csv", "scores.csv"}
+    tables = {"metrics.json", "predictions.csv", "scores.csv", "study.json"}
     pages = {"report.html", "remaining_life_by_unit.png", "models"}
     assert {path.name for path in life_study.iterdir()} == tables | pages
 

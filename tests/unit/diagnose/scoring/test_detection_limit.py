@@ -192,7 +192,8 @@ def test_the_share_of_resamples_is_of_the_resamples_alone():
     severity = rng.uniform(0.1, 0.9, unit.size)
     score = rng.normal(size=(1, unit.size)) + label * (6 * severity - 3)
     test = judged(score, label, unit)
-    limits_of = answer(test, None, severity[label == 1])["classes"]["crack"]["limits"]
+    result = answer(test, held_back(), severity[label == 1])
+    limits_of = result["classes"]["crack"]["limits"]
     counts = [200 * row["share_of_resamples_reached"] for row in limits_of]
     assert any(20 < count < 180 for count in counts)
     assert_allclose(counts, np.round(counts), atol=1e-9)
