@@ -50,32 +50,32 @@ def results_of(
         return
     before = set(multiprocessing.active_children())
     waiting, tries = deque(items), Counter[Item]()
-    # A pool a worker: when one dies, it is known which item it had in hand.
-    idle = [_pool(call) for _ in range(min(n_workers, len(waiting)))]
-    at_work: dict[Future[T], tuple[ProcessPoolExecutor, Item]] = {}
+    idle = [_Worker() for _ in range(min(n_workers, len(waiting)))]
+    at_work: dict[Future[T], tuple[_Worker, Item]] = {}
     try:
         while waiting or at_work:
             while waiting and idle:
-                pool, item = idle.pop(), waiting.popleft()
-                pool, future = _submit(pool, call, item)
-                at_work[future] = pool, item
+                worker, item = idle.pop(), waiting.popleft()
+                worker, future = _submit(worker, call, item)
+                at_work[future] = worker, item
             for future in _finished(at_work):
-                pool, item = at_work.pop(future)
+                worker, item = at_work.pop(future)
                 result: T | ShardFailure
                 try:
+                    worker.check()
                     result = future.result()
                 except BrokenProcessPool:
-                    pool.shutdown(wait=False)
-                    pool = _pool(call)
+                    worker.pool.shutdown(wait=False)
+                    worker = _Worker()
                     tries[item] += 1
                     if tries[item] < TRIES:
                         waiting.append(item)
-                        idle.append(pool)
+                        idle.append(worker)
                         continue
                     result = ShardFailure(
                         reason=f"its worker process died {TRIES} times"
                     )
-                idle.append(pool)
+                idle.append(worker)
                 yield item, result
     except BaseException:
         # What was in hand is lost: it lies in temporary files, if anywhere.
@@ -85,11 +85,35 @@ def results_of(
         raise
     finally:
         with stops_held():
-            for pool in [*idle, *(pool for pool, _ in at_work.values())]:
-                pool.shutdown(cancel_futures=True)
+            for worker in [*idle, *(worker for worker, _ in at_work.values())]:
+                worker.pool.shutdown(cancel_futures=True)
 
 
-def _pool(call: Callable[[Any], Any]) -> ProcessPoolExecutor:
+class _Worker:
+    """A process of its own: when it dies, it is known which item it had in hand.
+
+    It gets the call as its first work, not at its beginning. What a process is begun with is
+    written to a pipe, and to write more than that holds would wait for ever for a process that was
+    killed meanwhile.
+    """
+
+    def __init__(self) -> None:
+        self.pool = _pool()
+        self._has_call: Future[None] | None = None
+
+    def submit(self, call: Callable[[Item], T], item: Item) -> Future[T]:
+        """Give the process an item, and first of all the call."""
+        if self._has_call is None:
+            self._has_call = self.pool.submit(_take, call)
+        return self.pool.submit(_call, item)
+
+    def check(self) -> None:
+        """Raise what kept the process from taking the call."""
+        if self._has_call is not None:
+            self._has_call.result()
+
+
+def _pool() -> ProcessPoolExecutor:
     """A pool of one process, which starts with its first item."""
     for name in THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
@@ -98,21 +122,21 @@ def _pool(call: Callable[[Any], Any]) -> ProcessPoolExecutor:
         1,
         mp_context=context,
         initializer=_begin_worker,
-        initargs=(call, _is_quiet()),
+        initargs=(_is_quiet(),),
     )
 
 
 def _submit(
-    pool: ProcessPoolExecutor, call: Callable[[Item], T], item: Item
-) -> tuple[ProcessPoolExecutor, Future[T]]:
+    worker: _Worker, call: Callable[[Item], T], item: Item
+) -> tuple[_Worker, Future[T]]:
     """Give a worker an item; one that died while it had none is replaced first."""
     with stops_held(), interrupts_unseen(), _main_unknown():
         try:
-            return pool, pool.submit(_call, item)
+            return worker, worker.submit(call, item)
         except BrokenProcessPool:
-            pool.shutdown(wait=False)
-            pool = _pool(call)
-            return pool, pool.submit(_call, item)
+            worker.pool.shutdown(wait=False)
+            worker = _Worker()
+            return worker, worker.submit(call, item)
 
 
 def _finished(futures: Iterable[Future[T]]) -> set[Future[T]]:
@@ -152,7 +176,7 @@ def _is_quiet() -> bool:
     return first[0] == "ignore" and first[2] is UserWarning
 
 
-def _begin_worker(call: Callable[[Any], Any], is_quiet: bool) -> None:
+def _begin_worker(is_quiet: bool) -> None:
     """Leave Ctrl-C to the parent, show warnings as it does, and end when the parent ends."""
     set_warning_lines("gensig")
     if is_quiet:
@@ -161,6 +185,9 @@ def _begin_worker(call: Callable[[Any], Any], is_quiet: bool) -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+
+
+def _take(call: Callable[[Any], Any]) -> None:
     _worker["call"] = call
 
 

@@ -49,13 +49,22 @@ def test_a_freed_large_array_is_used_again_without_new_pages() -> None:
     assert page_faults("return") > 500
 
 
+NAP = """
+import time
+
+def nap(_shared, seconds):
+    time.sleep(seconds)
+"""
+# what workers share is more than a pipe holds, as the columns of a data set are
 SLEEPERS = """
-import sys, time
+import sys
+from nap import nap
 from diagnose.workers import call_all
 from gensig.terminal.program import guarded
 
 def run():
-    call_all(time.sleep, (), (600, 600), n_workers=2, on_done=print, remedy="")
+    shared = (bytes(10_000_000),)
+    call_all(nap, shared, (600, 600), n_workers=2, on_done=print, remedy="")
 
 if __name__ == "__main__":
     sys.exit(guarded("diagnose", run))
@@ -81,6 +90,7 @@ def test_a_signal_while_workers_start_is_one_line_and_leaves_none(
     """As from a terminal, which signals the group, and from a batch system, the parent."""
     script = tmp_path / "sleepers.py"
     script.write_text(SLEEPERS)
+    (tmp_path / "nap.py").write_text(NAP)
     process = subprocess.Popen(
         [sys.executable, str(script)],
         stderr=subprocess.PIPE,
