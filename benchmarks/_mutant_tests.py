@@ -45,6 +45,7 @@ COMMANDS = "tests/pipeline"
 FOLDERS = {
     "gensig/production": COMMANDS,
     "gensig/commands": f"{COMMANDS}/commands",
+    "diagnose/detectability": f"{COMMANDS}/commands",
 }
 MOST_FILES = 20  # of tests for one mutant, the nearest first
 FARTHEST = 3  # imports between a test and the mutated module, if a test is that near
@@ -233,7 +234,9 @@ def nearest_tests(root: Path, name: str, function: str = "") -> list[str]:
     farthest = max(FARTHEST, min(distances.values(), default=FARTHEST) + step)
     for test, distance in distances.items():
         likeness = _likeness(test, name)
-        if distance > min(farthest, MOST_IMPORTS) and likeness < ALIKE:
+        is_far = distance > min(farthest, MOST_IMPORTS) and likeness < ALIKE
+        # a figure or table of a command is drawn by many of its tests, however far
+        if is_far and not (step and test.startswith(folder)):
             continue
         is_late = test.startswith(COMMANDS) and distance > 1
         is_late = is_late and not folder.startswith(COMMANDS)

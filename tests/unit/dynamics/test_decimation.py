@@ -90,6 +90,15 @@ def test_channels_and_lanes_are_filtered_alone(n_samples, factor):
     assert np.isnan(spoilt[2]).all()
 
 
+def test_columns_of_a_table_are_filtered_alone_and_in_order():
+    """More columns than a vector has lanes."""
+    low_pass = decimator(4)
+    n_steps = (20 + 2 * low_pass.margin) * 4 + 1
+    means = np.random.default_rng(3).standard_normal((n_steps, 2 * LANES + 1))
+    alone = [low_pass.apply_to_columns(column[:, None])[:, 0] for column in means.T]
+    assert_close(low_pass.apply_to_columns(means), np.stack(alone, axis=1), atol=1e-14)
+
+
 def test_stored_taps_are_those_of_the_design(composed_config):
     stored = {int(factor) for factor in json.loads(STORED.read_text())}
     default = composed_config["solver"]["oversampling"]
