@@ -219,3 +219,21 @@ def test_tones_above_the_usable_band_are_left_out(at):
             follows="nothing",
         )
         assert np.all(response(run, [tone])[:2].std(axis=1) > 0.0) == is_kept
+
+
+def test_forces_of_equal_order_on_two_shafts_add_up(at):
+    """Each follows the angle of its own shaft."""
+    run = at()
+    tones = [
+        Tones(
+            gear=gear,
+            base=np.array([2.0]),
+            multiple=np.array([[1]]),
+            force=np.ones((1, 3), complex),
+            follows="nothing",
+        )
+        for gear in RATIO
+    ]
+    apart = sum(response(run, [tone]) for tone in tones)
+    together = response(run, tones)
+    assert_close(together, apart, atol=1e-5 * np.abs(apart).max())

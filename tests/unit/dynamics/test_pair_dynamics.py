@@ -211,6 +211,15 @@ class TestRefusals:
         with pytest.raises(SimulationError, match=text):
             machine({key: value}).check()
 
+    def test_its_frequency_is_told_in_hz(self, machine, xiamen, dynamics_of):
+        system = dynamics_of(xiamen).system()
+        stiffness, mass = 1e14, system.mass[system.names.index("pinion_y")]
+        with pytest.raises(SimulationError) as refused:
+            machine({"gear.pinion.support.stiffness_y_n_per_m": stiffness}).check()
+        (told,) = re.findall(r"pinion_y at (\S+) Hz", str(refused.value))
+        natural = math.sqrt(stiffness / mass) / (2 * math.pi)
+        assert float(told) == pytest.approx(natural, rel=1e-2)
+
     def test_integrations(self, xiamen, dynamics_of):
         dynamics = dynamics_of(xiamen)
         for changes, text in (
