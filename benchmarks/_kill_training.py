@@ -141,7 +141,7 @@ def contents(out: Path) -> dict[str, bytes]:
 def kill_trainings(
     n_kills: int, seed: int, folder: Path
 ) -> Iterator[tuple[str, list[str]]]:
-    """What was stopped and how, and what is wrong afterwards, a stop or a finished study a time."""
+    """Kind of each stop, and the faults found after it or after a finished study."""
     rng, data = random.Random(seed), folder / "data"
     if gensig(["generate", "--quiet", *SET, f"out={data}"]):
         raise SystemExit("the data set could not be made")

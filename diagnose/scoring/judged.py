@@ -157,12 +157,22 @@ def share_with_interval(
     case of the binomial", Biometrika 26 (4).
     """
     interval = with_interval(value, resampled, support)
-    low, high = interval["low"], interval["high"]
-    if low is not None and high is not None:
-        exact = exact_interval(value, support.n_groups)
-        interval["low"] = min(low, exact[0])
-        interval["high"] = max(high, exact[1])
+    ends = interval["low"], interval["high"]
+    interval["low"], interval["high"] = extended(*ends, value, support)
     return interval
+
+
+def extended(
+    low: float | None, high: float | None, share: float, support: Support
+) -> tuple[float | None, float | None]:
+    """Ends of the interval of a share, extended to those of `exact_interval`.
+
+    None stays, as of too few groups.
+    """
+    if low is None or high is None:
+        return low, high
+    exact = exact_interval(share, support.n_groups)
+    return min(low, exact[0]), max(high, exact[1])
 
 
 def exact_interval(share: float, n_trials: int) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from diagnose.data.windows import Task
 from diagnose.scoring.alarm_threshold import FALSE_ALARMS, alarm_threshold
-from diagnose.scoring.judged import exact_interval
+from diagnose.scoring.judged import extended
 from diagnose.scoring.machines import Machines, machines_of
 from diagnose.scoring.metrics import Score, percentile_interval, score_with_interval
 from diagnose.studies.counts import (
@@ -314,12 +314,9 @@ def _share(alarm: Mask, chosen: Mask, resamples: _Resamples) -> Entry:
     total = resamples.drawn @ resamples.count(chosen)
     per_seed = [float(row[chosen].mean()) for row in alarm]
     score = resamples.score(per_seed, _ratio(resamples.drawn @ hits.T, total))
-    if score["low"] is None:
-        return score
     support = resamples.machines.support(np.unique(resamples.unit[chosen]))
-    exact = exact_interval(score["mean"], support.n_groups)
-    ends = {"low": min(score["low"], exact[0]), "high": max(score["high"], exact[1])}
-    return score | ends
+    low, high = extended(score["low"], score["high"], score["mean"], support)
+    return score | {"low": low, "high": high}
 
 
 def _false_positives(scores: FloatArray, novel: Mask, resamples: _Resamples) -> Entry:

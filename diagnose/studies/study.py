@@ -110,8 +110,11 @@ def _checked_parts(task: Task, protocol: str) -> list[Segments]:
     """Stretches of every subset of a protocol; refuses one that cannot be judged."""
     labels = task.labels()
     is_open = protocol in OPEN_PROTOCOLS
+    subsets: tuple[str, ...] = SUBSETS
+    if not is_open:
+        subsets = subsets_of(task, protocol)
     parts = []
-    for subset in SUBSETS if is_open else subsets_of(task, protocol):
+    for subset in subsets:
         segments = subset_segments(task, protocol, subset)
         parts.append(segments)
         if is_open or subset in ("validation", REFERENCES):

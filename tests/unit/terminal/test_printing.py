@@ -88,7 +88,7 @@ def test_what_goes_to_stderr_is_one_line(act, capsys):
 
 @pytest.fixture
 def terminal(monkeypatch):
-    """What is shown on a terminal."""
+    """Text that is shown on a terminal."""
     shown = io.StringIO()
     console = partial(Console, file=shown, force_terminal=True, width=200)
     monkeypatch.setattr("rich.console.Console", lambda stderr: console())

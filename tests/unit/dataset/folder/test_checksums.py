@@ -130,7 +130,7 @@ def test_nothing_else_is_accepted(with_log, name):
 
 
 def test_an_edited_card_is_there_and_one_that_is_gone_is_not(with_log):
-    """What `gensig resume` looks at: a complete set with other words stays complete."""
+    """`gensig resume` leaves a complete set with other words complete."""
     manifest = read_manifest(with_log)
     (with_log / "README.md").write_text("# Mine\n")
     assert absences(with_log, manifest) == []

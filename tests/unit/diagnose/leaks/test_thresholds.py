@@ -77,7 +77,7 @@ def studies():
 
 
 def before_scoring(studies):
-    """What is set before the scoring, in both studies."""
+    """Values that are set before the scoring, in both studies."""
     results = [
         protocol_result(task, settings, "by_unit", predictions)
         for task, settings, predictions in studies
