@@ -102,7 +102,7 @@ def create_folder(
             refuse_used(out)
             made.folder(out)
             with locked(out):
-                refuse_used(out)  # another process may have been faster
+                _refuse_begun_meanwhile(out)
                 _clear(out)
                 for name, text in (note | texts).items():
                     made.folder((out / name).parent)
@@ -131,6 +131,18 @@ def refuse_used(out: Path) -> None:
             raise DatasetError(f"{out} {_contents(out)}")
     elif out.exists() or out.is_symlink():
         raise DatasetError(f"{out} exists and is no folder; choose another out=DIR")
+
+
+def _refuse_begun_meanwhile(out: Path) -> None:
+    """Raise DatasetError where another process has begun the folder that is locked here.
+
+    What that process does there is not asked, since the question takes this lock.
+    """
+    if any(out.iterdir()) and not _is_killed_beginning(out):
+        raise DatasetError(
+            f"{out} is not empty: another process has begun a data set there meanwhile; choose "
+            "another out=DIR"
+        )
 
 
 def _contents(out: Path) -> str:

@@ -2,10 +2,12 @@
 
 import os
 import signal
+from contextlib import contextmanager
 
 import pytest
 from dataset_samples import CONFIG, make_plan
 
+from gensig.dataset.folder import beginning
 from gensig.dataset.folder.beginning import create_folder, refuse_used
 from gensig.dataset.folder.layout import BEGINNING, read_manifest
 from gensig.dataset.folder.manifest import identity_hash
@@ -135,3 +137,23 @@ def test_two_processes_do_not_begin_the_same_folder(tmp_path):
             children.append(process)
         statuses = [os.waitpid(child, 0)[1] for child in children]
         assert sorted(map(os.waitstatus_to_exitcode, statuses)) == [0, 7]
+
+
+@pytest.mark.timeout(60)  # it would wait for a lock that it holds
+def test_a_folder_begun_by_another_process_before_the_lock_is_refused(
+    tmp_path, monkeypatch
+):
+    out = tmp_path / "set"
+    unhurried = beginning.locked
+
+    @contextmanager
+    def locked_late(folder):
+        monkeypatch.setattr(beginning, "locked", unhurried)
+        begin(out)
+        with unhurried(folder):
+            yield
+
+    monkeypatch.setattr(beginning, "locked", locked_late)
+    with pytest.raises(DatasetError, match="not empty: another process has begun"):
+        begin(out)
+    assert read_manifest(out).n_records == 9
