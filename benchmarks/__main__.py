@@ -16,16 +16,13 @@ from collections.abc import Sequence
 
 from benchmarks import _end_to_end, _rates
 from benchmarks._measure import begin, print_figures, write_json
-from benchmarks._peak import roof
 from benchmarks._ross_time import stored_rate
 from gensig.driveline.side_by_side.line_integration import line_core
 from gensig.dynamics._vector import LANES, PRECISIONS, n_lanes
-from gensig.dynamics.backends.nystroem.method import THREE_PAIRS as NYSTROEM_CORE
 
 RECORD = "import gensig; gensig.load_system('solver.precision={}').simulate()"
 PER_CORE = "simulated s per core-s"
-NYSTROEM = "two-evaluation core {} x5"
-TWO_STAGE = "two-stage box, two-evaluation core {} x5"
+TWO_STAGE = "two-stage box, compiled core {} x5"
 SCALAR, RK45 = (
     "scalar Numba RK4 x5, the same law",
     "solve_ivp RK45, right-hand side compiled",
@@ -37,10 +34,8 @@ RK45_NUMPY, KERNEL, RECORDS = (
 )
 # what was aimed at, as ratios in one run; kernels against scalar Numba, the rest as named
 GOALS = {
-    "kernel float64 over scalar Numba": 2.3,
-    "kernel float32 over scalar Numba": 4.0,
-    "two-evaluation core over scalar Numba, float64": 14.0,
-    "two-evaluation core over scalar Numba, float32": 22.0,
+    "pair over scalar Numba, float64": 14.0,
+    "pair over scalar Numba, float32": 22.0,
     "two-stage box over scalar Numba of a pair, float64": 7.0,
     "end to end over solve_ivp RK45, NumPy around the law": 2000.0,
     "end to end over ROSS run_time_response": 4000.0,
@@ -62,11 +57,6 @@ def kernels(runs: int, precisions: Sequence[str] = PRECISIONS) -> dict[str, floa
     )
     if "float32" in precisions:
         works[KERNEL.format("float32")] = _rates.kernel(lanes, 5, "float32")
-    for precision in precisions:
-        machines = lanes[: n_lanes(precision)]
-        works[NYSTROEM.format(precision)] = _rates.kernel(
-            machines, 5, precision, NYSTROEM_CORE
-        )
     boxes = _rates.two_stage_boxes()
     core = line_core(boxes[0])
     for precision in precisions:
@@ -91,7 +81,7 @@ def same_law() -> dict[str, float]:
         f"x{_rates.SAME_OVERSAMPLING}, required below {_rates.SAME:g}": _rates.check_same_law(
             eight
         ),
-        "x5, where the compiled core takes kinks apart": _rates.difference(eight, 5),
+        "x5, where only the scalar code takes kinks apart": _rates.difference(eight, 5),
     }
 
 
@@ -127,26 +117,15 @@ def ratios(
     rates: dict[str, float], ends: dict[str, dict[str, float]]
 ) -> dict[str, float]:
     """Ratios of rates, which compare between machines."""
-    result = {
-        f"kernel {precision} over scalar Numba": rates[KERNEL.format(precision)]
-        for precision in ends
-    }
-    result = {name: value / rates[SCALAR] for name, value in result.items()}
+    result = {}
     for precision in ends:
-        pair = rates[NYSTROEM.format(precision)]
-        result[f"two-evaluation core over scalar Numba, {precision}"] = (
-            pair / rates[SCALAR]
-        )
-        result[f"two-evaluation core over compiled core, {precision}"] = (
-            pair / rates[KERNEL.format(precision)]
-        )
+        pair = rates[KERNEL.format(precision)]
+        result[f"pair over scalar Numba, {precision}"] = pair / rates[SCALAR]
         box = rates[TWO_STAGE.format(precision)]
         result[f"two-stage box over scalar Numba of a pair, {precision}"] = (
             box / rates[SCALAR]
         )
-        result[f"pair over two-stage box, two-evaluation core, {precision}"] = (
-            pair / box
-        )
+        result[f"pair over two-stage box, {precision}"] = pair / box
     end = ends["float64"][RECORDS]
     if "float32" in ends:
         result["float32 over float64, end to end"] = ends["float32"][RECORDS] / end
@@ -197,10 +176,6 @@ def main() -> None:
         precisions, size = ("float64",), _end_to_end.QUICK
     show("difference of scalar code and compiled core", same_law())
     show(f"integrators, {PER_CORE}", kernels(arguments.runs, precisions))
-    show(
-        "roof of the compiled core: its additions and multiplications alone",
-        roof(8 * arguments.runs, 5),
-    )
     rates, ends = sections[f"integrators, {PER_CORE}"], {}
     for precision in precisions:
         values = _end_to_end.by_stage(precision, arguments.runs, size=size)

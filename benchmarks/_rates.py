@@ -12,15 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from benchmarks import _scalar
+from benchmarks import _classical_scheme, _scalar
 from benchmarks._measure import in_turn
 from gensig.driveline.side_by_side.line_dynamics import LineDynamics
 from gensig.driveline.side_by_side.line_records import dynamics_of
-from gensig.dynamics import _kernels
 from gensig.dynamics._layout import N_LAW
 from gensig.dynamics._vector import LANES, n_lanes
 from gensig.dynamics.backends.group_run import Core, DynamicsT, GroupRun
-from gensig.dynamics.backends.runge_kutta import CORE
+from gensig.dynamics.backends.nystroem.method import THREE_PAIRS
 from gensig.dynamics.decimation import decimator, in_band_error
 from gensig.dynamics.lanes import fill_lanes, pack
 from gensig.dynamics.pair import PairDynamics
@@ -88,7 +87,7 @@ def kernel(
     lanes: Sequence[DynamicsT],
     oversampling: int,
     precision: str = "float64",
-    core: Core[DynamicsT] = CORE,
+    core: Core[DynamicsT] = THREE_PAIRS,
 ) -> Work:
     """The product's integrator with the mean accelerations of four channels, tables already
     packed.
@@ -180,11 +179,12 @@ def difference(all_of: list[PairDynamics], oversampling: int) -> float:
     """
     step, low_pass = 1.0 / (SAMPLING_RATE * oversampling), decimator(oversampling)
     n_steps = (round(SETTLING * SAMPLING_RATE) + 2 * low_pass.margin) * oversampling + 1
-    group, run = pack(all_of, step), GroupRun(all_of, CHANNELS, "float64", CORE)
+    group = THREE_PAIRS.pack(all_of, step, "float64", (0.0, 0.0))
+    run = GroupRun(all_of, CHANNELS, "float64", THREE_PAIRS)
     for lane, dynamics in enumerate(all_of):
         run.begin(group, lane, dynamics.static_start(0.0))
     ours = np.empty((n_steps, len(CHANNELS), LANES))
-    _kernels.integrate(
+    THREE_PAIRS.integrate(
         group,
         run.state.ravel(),
         run.lost,
@@ -259,7 +259,7 @@ def _numpy_right_hand_side(dynamics: PairDynamics) -> RightHandSide:
         dynamics.system(),
         dynamics.approach_direction(),
     )
-    n_dof, scratch = len(system.mass), _kernels.scratch(len(system.mass), 0)
+    n_dof, scratch = len(system.mass), _classical_scheme.scratch(len(system.mass), 0)
     motion, result = np.empty((4, LANES)), np.empty((N_LAW, LANES))
     radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
 
@@ -269,7 +269,7 @@ def _numpy_right_hand_side(dynamics: PairDynamics) -> RightHandSide:
         motion[:] = np.array(
             [roll, direction @ q, direction @ v, radius * (speed + v[2])]
         )[:, None]
-        _kernels.law_at(group, motion.ravel(), *scratch, result.ravel())
+        _classical_scheme.law_at(group, motion.ravel(), *scratch, result.ravel())
         normal, friction, moment_p, moment_w, along = result[:5, 0]
         force = (
             system.force

@@ -1,7 +1,7 @@
 """CPU time of a record of ``gensig generate`` by stage: ``python -m benchmarks.stages``.
 
 Quickstart records of 1 s and four channels, made in one process, in 160 records of five shards.
-The methods and precisions take turns in one run; compare ratios only.
+The precisions take turns in one run; compare ratios only.
 """
 
 from __future__ import annotations
@@ -10,26 +10,20 @@ import time
 
 from benchmarks import _end_to_end, _rates
 from benchmarks._measure import begin, write_json
+from gensig.dynamics._vector import PRECISIONS
 
-KINDS = (
-    ("runge_kutta", "float64"),
-    ("nystroem", "float64"),
-    ("nystroem", "float32"),
-)
 RK45 = "solve_ivp RK45, right-hand side compiled"
 
 
 def main() -> None:
-    """Measure and print one column for each method and precision."""
+    """Measure and print one column for each precision."""
     arguments, named, begun = begin("benchmarks.stages", __doc__ or "")
-    kinds, size = KINDS, _end_to_end.WHOLE
+    size = _end_to_end.WHOLE
     if arguments.quick:
-        kinds, size = KINDS[:2], _end_to_end.QUICK
+        size = _end_to_end.QUICK
     columns = {
-        f"{backend} {precision}": _end_to_end.by_stage(
-            precision, arguments.runs, f"solver.backend={backend}", size=size
-        )
-        for backend, precision in kinds
+        precision: _end_to_end.by_stage(precision, arguments.runs, size=size)
+        for precision in PRECISIONS
     }
     print("\n" + " " * 62 + "".join(f"{name:>22}" for name in columns))
     for row in next(iter(columns.values())):

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gensig.dynamics import _kernels
+from benchmarks import _classical_scheme
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._vector import LANES
 from gensig.dynamics.lanes import pack
@@ -35,9 +35,9 @@ def group_laws(group: layout.Group, motions: np.ndarray) -> np.ndarray:
     padded = np.concatenate([motions, np.repeat(motions[-1:], -n % LANES, axis=0)])
     padded = padded.reshape(-1, LANES, 4)
     laws = np.empty((len(padded), layout.N_LAW, LANES))
-    scratch = _kernels.scratch(len(group.force) // LANES, 0)
+    scratch = _classical_scheme.scratch(len(group.force) // LANES, 0)
     for motion, law in zip(padded, laws, strict=True):
-        _kernels.law_at(
+        _classical_scheme.law_at(
             group, np.ascontiguousarray(motion.T).ravel(), *scratch, law.ravel()
         )
     return laws.transpose(0, 2, 1).reshape(-1, layout.N_LAW)[:n]
@@ -48,12 +48,15 @@ def law_of(dynamics: PairDynamics, step: float = 1e-6) -> Callable[..., np.ndarr
 
     The next call overwrites the result.
     """
-    group, scratch = pack([dynamics], step), _kernels.scratch(len(dynamics.dofs), 0)
+    group, scratch = (
+        pack([dynamics], step),
+        _classical_scheme.scratch(len(dynamics.dofs), 0),
+    )
     motion, result = np.empty((4, LANES)), np.empty((layout.N_LAW, LANES))
 
     def law(*state: float) -> np.ndarray:
         motion[:] = np.array(state)[:, None]
-        _kernels.law_at(group, motion.ravel(), *scratch, result.ravel())
+        _classical_scheme.law_at(group, motion.ravel(), *scratch, result.ravel())
         return result[:, 0]
 
     return law
@@ -77,8 +80,8 @@ def _advance(group, q, v, step, first_step, n_steps, channels=()):
     start = np.array([q - group.rest[:, 0], v], dtype=np.float64)
     state = np.repeat(start[:, :, None], LANES, axis=2)
     means = np.empty((n_steps, len(index), LANES))
-    work, wide, near = _kernels.scratch(len(q), len(index))
-    _kernels.integrate(
+    work, wide, near = _classical_scheme.scratch(len(q), len(index))
+    _classical_scheme.integrate(
         group,
         state.ravel(),
         np.zeros(LANES),

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks._classical_scheme import Classical
 from gensig.dynamics import integrator
-from gensig.dynamics.backends.base import Motions
+from gensig.dynamics.backends.base import Integration, Motions
 
 
 def stacked(motions: Motions) -> Motions:
@@ -23,3 +24,17 @@ def stacked(motions: Motions) -> Motions:
 def integrate(*arguments, **options) -> Motions:
     """``gensig.dynamics.integrator.integrate`` with the motions in arrays."""
     return stacked(integrator.integrate(*arguments, **options))
+
+
+def exact_motions(
+    machines, oversampling, *, with_mesh_state=False, **record
+) -> Motions:
+    """Motions by the classical scheme, in so many steps a sample."""
+    integration = Integration(
+        oversampling=oversampling,
+        precision="float64",
+        max_error=None,
+        with_mesh_state=with_mesh_state,
+        **record,
+    )
+    return stacked(Classical().integrate(machines, integration))

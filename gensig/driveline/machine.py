@@ -29,7 +29,6 @@ from gensig.driveline.line_gears import (
 )
 from gensig.driveline.linear.linear_drive_line import LinearDriveLine
 from gensig.driveline.machine_checks import (
-    SIDE_BY_SIDE,
     check_sensing,
     check_solver,
     require_followed,
@@ -64,6 +63,7 @@ from gensig.driveline.teeth import (
 )
 from gensig.driveline.time.newmark import LineMotion, LineSolver
 from gensig.dynamics._layout import MOST_PAIRS
+from gensig.dynamics.backends.registry import EXPLICIT_BACKEND
 from gensig.dynamics.integrator import check_memory
 from gensig.dynamics.mesh_state import MeshState
 from gensig.dynamics.pair import Body
@@ -171,7 +171,7 @@ class LineMachine(Machine):
     @property
     def side_by_side(self) -> bool:
         """True where the two-evaluation core integrates the line, several records at once."""
-        return self.solver.backend == SIDE_BY_SIDE
+        return self.solver.backend == EXPLICIT_BACKEND
 
     @property
     def most_pairs(self) -> int:

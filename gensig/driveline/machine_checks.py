@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.driveline.engine_line import EngineLine
-from gensig.dynamics.backends.registry import IMPLICIT_BACKEND, UNNAMED_BACKEND
+from gensig.dynamics.backends.registry import EXPLICIT_BACKEND, IMPLICIT_BACKEND
 from gensig.dynamics.integrator import Solver
 from gensig.errors import ConfigError
 from gensig.faults.base import Fault
@@ -19,12 +19,9 @@ from gensig.mesh.pair_table import PairTable
 from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.systems.base import Machine
 
-SIDE_BY_SIDE = (
-    "nystroem"  # several records at once, by ``gensig.driveline.side_by_side``
-)
 Array = NDArray[np.float64]
 
-LINE_BACKENDS = (SIDE_BY_SIDE, IMPLICIT_BACKEND)
+LINE_BACKENDS = (EXPLICIT_BACKEND, IMPLICIT_BACKEND)
 
 # times the force of the supports; the stiffness of a ball bearing follows its third root
 FAR_ABOVE = 3.0
@@ -37,16 +34,16 @@ def check_solver(mesh: MeshOptions, solver: Solver) -> None:
             f"mesh.law = {mesh.law}: the meshes of a drive line are one-sided; "
             "take mesh.law=one_sided"
         )
-    # lines of 0.9.0 name no method and have the implicit one
-    if solver.backend not in (*LINE_BACKENDS, UNNAMED_BACKEND):
+    if solver.backend not in LINE_BACKENDS:
         raise ConfigError(
             f"solver.backend = {solver.backend}: a drive line has integrators of "
             f"its own; take solver.backend={' or '.join(LINE_BACKENDS)}"
         )
-    if solver.backend != SIDE_BY_SIDE and solver.precision != "float64":
+    if solver.backend != EXPLICIT_BACKEND and solver.precision != "float64":
         raise ConfigError(
             f"solver.precision = {solver.precision}: a drive line is integrated in "
-            "float64; take solver.precision=float64, or solver.backend=nystroem"
+            "float64; take solver.precision=float64, or "
+            f"solver.backend={EXPLICIT_BACKEND}"
         )
 
 

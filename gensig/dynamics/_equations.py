@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._layout import CENTER, MARGIN, MOST_PAIRS, is_helical
+from gensig.dynamics._layout import CENTER, is_helical
 from gensig.dynamics._vector import (
     at,
     chosen,
@@ -17,7 +17,6 @@ from gensig.dynamics._vector import (
     inlined,
     set_row,
     spread,
-    where_above,
     width,
 )
 from gensig.dynamics._written import written
@@ -25,7 +24,6 @@ from gensig.dynamics._written import written
 # degrees of freedom of the two gears, first in every machine; helical gears have more after them
 P_X, P_Y, P_TURN, W_X, W_Y, W_TURN, N_IN_PLANE = range(7)
 N_GEARS = 12
-EARLIEST, LATEST = 0.02, 0.98  # share of a step at which it may be cut in two
 
 
 @written
@@ -146,40 +144,3 @@ def recenter(group, q, n_dof, work, wide):
         wide[at(CENTER, lane, n)] += work[at(q + P_TURN, lane, n)]
     for d in range(n_dof):
         set_row(work, q + d, get_row(work, q + d) - turn * get_row(group.rotation, d))
-
-
-@written
-def _earlier_crossing(earliest, before, after, fall, zero, one):
-    """The lesser of ``earliest`` and the share of the step at which a number crosses 0.
-
-    ``fall`` is ``before`` less ``after``.
-    """
-    share = where_above(zero, before * after, before / fall, one)
-    return where_above(earliest, share, share, earliest)
-
-
-@inlined
-def event(group, first, last, work):
-    """Share of the step at which the first pair takes up or releases its load.
-
-    From the margins at both ends of the step.
-    """
-    zero, one = spread(work, 0.0), spread(work, 1.0)
-    earliest = one
-    for k in range(first, last):
-        before = get_row(work, MARGIN + k)
-        after = get_row(work, MARGIN + MOST_PAIRS + k)
-        fall = before - after
-        earliest = _earlier_crossing(earliest, before, after, fall, zero, one)
-        if not group.one_sided:  # and where the pair is wholly in contact
-            before, after = before - 1.0, after - 1.0
-            earliest = _earlier_crossing(earliest, before, after, fall, zero, one)
-    play = get_row(group.numbers, layout.BACKLASH)
-    before = get_row(work, layout.WITHIN) + play
-    after = get_row(work, layout.STEP_APPROACH) + play
-    fall = before - after
-    earliest = _earlier_crossing(earliest, before, after, fall, zero, one)
-    earliest = where_above(one, earliest, earliest, spread(work, 0.5))
-    low, high = spread(work, EARLIEST), spread(work, LATEST)
-    earliest = where_above(low, earliest, low, earliest)
-    return where_above(earliest, high, high, earliest)

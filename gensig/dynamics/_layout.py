@@ -100,10 +100,10 @@ TILT = ERROR + MOST_PAIRS
 AHEAD = TILT + MOST_PAIRS  # roll of a slot, less that at the begin of the step
 WITHIN = AHEAD + N_SLOTS
 FLAGS = WITHIN + 1
-STEP_APPROACH = FLAGS + 1  # the approach at the last stage of a step
+BEGUN = FLAGS + 1  # of drive lines: rotation of gear a at the begin of the step
 # motion of the mesh at a stage; the roll is counted from the begin of the step
 MOTION_ROLL, MOTION_APPROACH, MOTION_RATE, MOTION_ROLL_RATE = range(
-    STEP_APPROACH + 1, STEP_APPROACH + 5
+    BEGUN + 1, BEGUN + 5
 )
 N_LAW = 8
 LAW = MOTION_ROLL_RATE + 1  # fields of ``Law``
@@ -121,11 +121,6 @@ PAIR_DAMPED = (
 )  # factor of the damping of every pair
 MOST_DAMPER = PAIR_DAMPED + MOST_PAIRS  # largest damper of a pair, N s/m
 N_MESH = MOST_DAMPER + 1
-# blocks of the machine behind the rows of the mesh, in rows per degree of freedom: five states,
-# each q and then v; the accelerations of a stage and their sums for q and v. Behind them follow
-# the rows of the drive, the forces, and the mean accelerations of a step and of its first part
-NOW, SINGLE, PARTED, TRIAL_A, TRIAL_B, ACCELERATIONS = range(0, 12, 2)
-SUM_Q, SUM_V, BEHIND = 11, 12, 13
 # rows of the drive at the begin of a step: nominal speed, its change, share of the set torque,
 # rotation of the pinion
 DRIVE_SPEED, DRIVE_GAIN, DRIVE_TORQUE, DRIVE_CENTER, N_DRIVE = range(5)
@@ -278,9 +273,3 @@ def raw_index(block, pair, lane, n):
 def span_index(slot, n):
     """Index of the spans of a slot; ``FIRST_READ`` to ``LAST_NEAR_PAIR`` count from there."""
     return SPAN * n + N_SPAN * slot
-
-
-@written
-def machine_rows(block, n_dof):
-    """First row of a block of the machine; see ``NOW``."""
-    return N_MESH + block * n_dof

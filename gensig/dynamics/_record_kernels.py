@@ -27,7 +27,29 @@ _CORES: dict[Any, Any] = {}  # by the type of the group that they advance
 
 
 def integrate(group, *arguments):
-    """Advance a group by the method of its type; arguments are those of ``_kernels.integrate``."""
+    """Advance every lane of a group by ``n_steps``, by the method of the group's type.
+
+    Arguments follow ``group``, in this order:
+
+    state : (2, dof, lane)    q and v, advanced in place; the pinion has also turned by
+        ``wide[CENTER]``
+    lost : (mesh, lane)       the number of steps without contact is added
+    fresh : (lane,)           1 where the state is new: its tables are read first. 0 continues as
+        if the last call of this group, step and scratch had not ended, so the ends of calls leave
+        no trace
+    step, first_step, n_steps : s, number of the first step since time 0, and how many
+    channels : (channel,)     degrees of freedom
+    out : (step, channel, lane)    takes, from row ``out_row`` on, the mean acceleration over each
+        step: velocity gained by the equations, over the step. Kinks then alias far less than with
+        point values. A negative row stores nothing
+    angle : (sample, angle, lane)    takes, from row ``angle_row`` on, the angles in rad since time
+        0 at the begin of every step whose number ``per_angle`` divides; a negative row stores
+        nothing
+    seen : (sample, N_SEEN, lane)    takes the state of the pairs at the same steps; may be empty
+    work, wide, near : scratch of the method
+
+    Returns the next row of ``angle``.
+    """
     raise NotImplementedError("only compiled functions can call it")
 
 

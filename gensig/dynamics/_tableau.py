@@ -8,25 +8,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 
-class Tableau(NamedTuple):
-    """Coefficients of a Runge-Kutta scheme of four stages for q'' = a(t, q, q').
-
-    Stage i is at ``node[i]`` of the step; its state is ``node[i]`` of the step away along the
-    slopes of the stage before. The two stages in the middle are alike. Over a step h
-
-        q_1 = q_0 + h (v_0 + h share sum position[i] a_i)
-        v_1 = v_0 + h share sum weight[i] a_i
-
-    so that the mean acceleration of the step is share sum weight[i] a_i. ``position[i]`` follows
-    from the weights and nodes of the later stages.
-    """
-
-    node: tuple[float, float, float, float]
-    weight: tuple[float, float, float, float]
-    position: tuple[float, float, float, float]
-    share: float
-
-
 class CubicMiddle(NamedTuple):
     """Value and slope of a cubic half-way between two ends at a distance d.
 
@@ -78,13 +59,6 @@ def average_acceleration(beta: float, gamma: float) -> Newmark:
     return Newmark(beta=beta, gamma=gamma, mass=1.0 / beta, damping=gamma / beta)
 
 
-# Kutta (1901), the classical scheme of fourth order
-RK4 = Tableau(
-    node=(0.0, 0.5, 0.5, 1.0),
-    weight=(1.0, 2.0, 2.0, 1.0),
-    position=(1.0, 1.0, 1.0, 0.0),
-    share=1.0 / 6.0,
-)
 CUBIC_MIDDLE = CubicMiddle(
     value_by_values=0.5,
     value_by_slopes=0.125,

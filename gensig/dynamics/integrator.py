@@ -9,15 +9,12 @@ from gensig.dynamics._vector import PRECISIONS
 from gensig.dynamics.backends.base import BOUNCING, Integration, Motions, count_samples
 from gensig.dynamics.backends.registry import (
     BACKENDS,
+    EXPLICIT_BACKEND,
     IMPLICIT_BACKEND,
-    UNNAMED_BACKEND,
+    RETIRED_BACKEND,
     backend_names,
 )
-from gensig.dynamics.backends.step_limits import (
-    CoarseStepWarning,
-    check_step,
-    settling_time,
-)
+from gensig.dynamics.backends.step_limits import CoarseStepWarning, settling_time
 from gensig.dynamics.pair import DOFS, PairDynamics
 from gensig.errors import ConfigError, SimulationError
 
@@ -30,7 +27,6 @@ __all__ = [
     "check_channels",
     "check_machine",
     "check_memory",
-    "check_step",
     "count_samples",
     "integrate",
     "records_together",
@@ -51,14 +47,13 @@ class Solver:
     precision : of the numbers, ``float64`` or ``float32``
     max_error : a record with a larger error is integrated again with twice as many steps, up to
         64; None does not compute the error
-    backend : the method, a name of ``backend_names``; without it, as in version 0.9.0,
-        ``runge_kutta``
+    backend : the method, a name of ``backend_names``
     """
 
     oversampling: int
     precision: str
     max_error: float | None = None
-    backend: str = UNNAMED_BACKEND
+    backend: str = EXPLICIT_BACKEND
 
     def __post_init__(self) -> None:
         if not 2 <= self.oversampling <= 256:
@@ -72,6 +67,11 @@ class Solver:
         if self.max_error is not None and not 1e-6 <= self.max_error <= 1.0:
             raise ConfigError(
                 f"solver.max_error = {self.max_error:g} must lie in 1e-6..1, or be null"
+            )
+        if self.backend == RETIRED_BACKEND:
+            raise ConfigError(
+                f"solver.backend = {RETIRED_BACKEND}, the method of data sets that name none, left "
+                f"with version 0.19; take solver.backend={EXPLICIT_BACKEND}"
             )
         if self.backend not in backend_names():
             raise ConfigError(

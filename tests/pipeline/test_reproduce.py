@@ -13,7 +13,6 @@ from small_sets import TINY, make
 
 from gensig.cli import main
 from gensig.dataset.storage.atomic import sha256_file
-from gensig.dynamics.backends.registry import UNNAMED_BACKEND
 from gensig.production import reproduction
 from gensig.production.reproduction import ACCEPTED
 
@@ -23,7 +22,6 @@ SET = (
     "dataset.store_tacho=true",
     "dataset.store_mesh_state=true",
     "dataset.store_encoder=true",
-    "solver.backend=runge_kutta",  # that of sets that name none
 )
 
 
@@ -80,14 +78,14 @@ def edit_manifest(folder, change):
     file.write_text(json.dumps(content))
 
 
-def test_a_set_that_names_the_backend_of_old_sets_goes_on(
+def test_a_set_that_names_a_later_key_at_its_default_goes_on(
     reference, tmp_path, reproduce
 ):
     """The missing key and its default are one configuration."""
     folder = shutil.copytree(reference, tmp_path / "data")
     config = yaml.safe_load((folder / "config.yaml").read_text())
-    assert "backend" not in config["solver"]
-    config["solver"]["backend"] = UNNAMED_BACKEND
+    assert "n_reference" not in config["plan"]
+    config["plan"]["n_reference"] = 0
     (folder / "config.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
     equal = (0, "2 of 2 records have the same bits\n")
     assert reproduce(folder, "--records", "2") == equal

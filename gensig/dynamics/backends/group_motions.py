@@ -6,28 +6,20 @@ import dataclasses
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics._vector import n_lanes
-from gensig.dynamics.backends.base import (
-    BOUNCING,
-    OUT_OF_BOUNDS,
-    Integration,
-    Motions,
-)
+from gensig.dynamics.backends.base import OUT_OF_BOUNDS, Integration, Motions
 from gensig.dynamics.backends.group_run import Core, Dynamics, DynamicsT, GroupRun
-from gensig.dynamics.backends.step_limits import settling_stages
+from gensig.dynamics.backends.step_limits import FINE_TIME, SETTLING_STEPS
 from gensig.dynamics.decimation import decimator
 from gensig.dynamics.lanes import at_step, fill_lanes
 
 Array = NDArray[np.float64]
-Stages: TypeAlias = Sequence[tuple[int, int]]
 
-# steps per sample of the repeated settling of a machine that bounced: hard landings are stiff
-CAREFUL = 3
 SHORT_ROWS = "check", "mean_speed", "contact_loss", "finite"  # of ``Motions``
 CHECKED = 0.03  # s at the beginning of a record, integrated again at half the step
 
@@ -35,7 +27,7 @@ CHECKED = 0.03  # s at the beginning of a record, integrated again at half the s
 def integrate_machines(
     machines: Sequence[DynamicsT], integration: Integration, core: Core[DynamicsT]
 ) -> Motions:
-    """Motions of machines, integrated in groups that settle in the same stages."""
+    """Motions of machines, integrated in groups that settle in the same steps."""
     groups = lane_groups(machines, integration, core)
     motions = (
         (group, integrate_group([machines[i] for i in group], integration, core))
@@ -64,10 +56,10 @@ def lane_groups(
 def settling_steps(
     machine: DynamicsT, integration: Integration, core: Core[DynamicsT]
 ) -> int:
-    """Least steps per sample in which a machine settles."""
+    """Steps per sample in which a machine settles."""
     fine = integration.oversampling
     stable = core.coarsest_oversampling(machine, fine, integration.sampling_rate)
-    return max(stable, min(core.settling_steps, fine))
+    return max(stable, min(SETTLING_STEPS, fine))
 
 
 def in_order(groups: Iterable[tuple[list[int], Motions]], n_machines: int) -> Motions:
@@ -115,10 +107,7 @@ def integrate_group(
     precision = integration.precision
     low_pass, lanes = decimator(oversampling), fill_lanes(machines, precision)
     # output samples; time 0 is the first recorded one
-    least = settling_steps(machines[0], integration, core)
-    settling = settling_stages(least, oversampling, rate)
-    stages = [(n_steps, -low_pass.margin - before) for n_steps, before in settling]
-    end = stages[-1][1]
+    end = -low_pass.margin - math.ceil(FINE_TIME * rate)
     # every lane begins at a time of its own; its motion before is not used
     durations = [math.ceil(settling_time(core, machine) * rate) for machine in lanes]
     begins = [min(end - 1, -low_pass.margin - n) for n in durations]
@@ -131,7 +120,8 @@ def integrate_group(
     )
     channels = [machines[0].dofs.index(name) for name in integration.channels]
     run = GroupRun(lanes, np.array(channels, dtype=np.int64), precision, core)
-    run = settled(run, lanes, begins, stages, steps, oversampling)
+    coarse = settling_steps(machines[0], integration, core)
+    run = settled(run, lanes, begins, end, steps, (coarse, oversampling))
     return recorded(run, steps, integration, end)
 
 
@@ -155,63 +145,48 @@ def settled(
     run: GroupRun,
     lanes: Sequence[Dynamics],
     begins: Sequence[int],
-    stages: Stages,
+    end: int,
     steps: GroupSteps,
-    oversampling: int,
+    per_sample: tuple[int, int],
 ) -> GroupRun:
-    """Machines at the end of the last stage.
+    """Machines at output sample ``end``, which have settled in coarse steps.
 
-    Those that bounced have settled in finer steps. Those that went out of bounds even so have
-    settled in the steps of the record: the stiffness of a hard landing has no bound, so that no
-    step can be known to be stable in it.
-    """
-    run, bounced = run_stages(run, lanes, begins, stages, steps)
-    careful = [(min(oversampling, max(CAREFUL, n)), until) for n, until in stages]
-    if bounced.any() and careful != stages:
-        run.take(run_stages(run, lanes, begins, careful, steps)[0], bounced)
-    diverged = ~run.is_within(OUT_OF_BOUNDS)
-    finest = [(oversampling, until) for _, until in stages]
-    if diverged.any() and finest != careful:
-        run.take(run_stages(run, lanes, begins, finest, steps)[0], diverged)
-    return run.restarted()
-
-
-def run_stages(
-    run: GroupRun,
-    lanes: Sequence[Dynamics],
-    begins: Sequence[int],
-    stages: Stages,
-    steps: GroupSteps,
-) -> tuple[GroupRun, NDArray[np.bool_]]:
-    """Integrate machines through the stages of the settling.
+    Those that went out of bounds have settled in the steps of the record: the stiffness of a hard
+    landing has no bound, so that no step can be known to be stable in it.
 
     Parameters
     ----------
     begins : output sample at which each lane begins, at rest
-    stages : steps per sample, and the output sample at which the stage ends
-
-    Returns
-    -------
-    the machines at the end of the last stage, and flags of those that bounced or went out of
-    bounds, (lane,)
+    per_sample : coarse steps and steps of the record per sample
     """
-    now, lost = min(begins), np.zeros(len(lanes))
-    for n_steps, until in stages:
-        run, (group, step) = run.restarted(), steps.at(n_steps)
-        for begin in sorted({begin for begin in begins if now <= begin < until}):
-            run.advance(group, step, now * n_steps, (begin - now) * n_steps)
-            for lane, dynamics in enumerate(lanes):
-                if begins[lane] == begin:
-                    start = dynamics.static_start(begin * n_steps * step)
-                    run.begin(group, lane, start)
-                    lost[lane] = 0.0
-            now = begin
-        if now < until:
-            run.advance(group, step, now * n_steps, (until - now) * n_steps)
-            now = until
-        lost += run.lost.max(axis=0) / n_steps
-    bounced = lost > BOUNCING * (now - np.array(begins))
-    return run, ~run.is_within(OUT_OF_BOUNDS) | bounced
+    coarse, fine = per_sample
+    run = run_until(run, lanes, begins, end, steps, coarse)
+    diverged = ~run.is_within(OUT_OF_BOUNDS)
+    if diverged.any() and coarse != fine:
+        run.take(run_until(run, lanes, begins, end, steps, fine), diverged)
+    return run.restarted()
+
+
+def run_until(
+    run: GroupRun,
+    lanes: Sequence[Dynamics],
+    begins: Sequence[int],
+    end: int,
+    steps: GroupSteps,
+    n_steps: int,
+) -> GroupRun:
+    """Machines at output sample ``end`` after so many steps per sample."""
+    run, (group, step) = run.restarted(), steps.at(n_steps)
+    now = min(begins)
+    for begin in sorted(set(begins)):
+        run.advance(group, step, now * n_steps, (begin - now) * n_steps)
+        for lane, dynamics in enumerate(lanes):
+            if begins[lane] == begin:
+                start = dynamics.static_start(begin * n_steps * step)
+                run.begin(group, lane, start)
+        now = begin
+    run.advance(group, step, now * n_steps, (end - now) * n_steps)
+    return run
 
 
 def recorded(

@@ -35,7 +35,7 @@ DynamicsT = TypeVar("DynamicsT", bound=Dynamics)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Core(Generic[DynamicsT]):
-    """A method in compiled functions, with the arguments of those of ``_kernels``.
+    """A method in compiled functions, as ``_record_kernels.integrate`` describes them.
 
     Parameters
     ----------
@@ -44,8 +44,6 @@ class Core(Generic[DynamicsT]):
     coarsest_oversampling : the least stable number of steps per sample of a machine, at most a
         given one, at a sampling rate
     settling_time : after which a start from rest has settled, s
-    settling_steps : least steps per sample of the settling. Machines that need more are groups
-        of their own, and each kind of group leaves lanes empty
     n_meshes, n_angles : meshes of a machine, and angles that are given out
     """
 
@@ -54,7 +52,6 @@ class Core(Generic[DynamicsT]):
     integrate: Any
     coarsest_oversampling: Callable[[DynamicsT, int, float], int]
     settling_time: Callable[[DynamicsT], float]
-    settling_steps: int = 3
     n_meshes: int = 1
     n_angles: int = 1
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from fault_cases import one
-from stacked_motions import integrate
+from stacked_motions import exact_motions, integrate
 
 from gensig.dynamics.backends.nystroem import method
 from gensig.dynamics.decimation import in_band_error
@@ -37,11 +37,18 @@ PAPER = {
 }
 
 
-def motions(machines, backend, oversampling, channels=PLANE, precision="float64"):
-    """Motions of machines by a backend, with the forces of their teeth."""
-    solver = Solver(oversampling=oversampling, precision=precision, backend=backend)
+def motions(machines, oversampling, channels=PLANE, precision="float64"):
+    """Motions of machines by the default method, with the forces of their teeth."""
+    solver = Solver(oversampling=oversampling, precision=precision)
     return integrate(
         machines, solver, channels=channels, with_mesh_state=True, **RECORD
+    )
+
+
+def reference(machines, oversampling, channels=PLANE):
+    """The same by the classical scheme."""
+    return exact_motions(
+        machines, oversampling, channels=channels, with_mesh_state=True, **RECORD
     )
 
 
@@ -67,18 +74,18 @@ class TestSpurPairsOfAnyContactRatio:
     @pytest.mark.parametrize("precision", ["float64", "float32"])
     def test_motions(self, machine, dynamics_of, pairs, precision, monkeypatch):
         monkeypatch.setattr(method, "MOST_CONTACT_RATIO", 0.0)
-        exact = motions(pairs, "runge_kutta", FINE)
-        found = motions(pairs, "nystroem", 5, precision=precision)
+        exact = reference(pairs, FINE)
+        found = motions(pairs, 5, precision=precision)
         assert error(found, exact).max() < 1e-3
         assert np.abs(found.angle - exact.angle).max() < 1e-5
         other = dynamics_of(machine({**QUICK, **MORE_DAMPED}))
-        shown = motions([other], "nystroem", 5, precision=precision)
+        shown = motions([other], 5, precision=precision)
         assert in_band_error(shown.acceleration, exact.acceleration[:1], RATE)[0] > 5e-3
 
     def test_they_are_followed_by_that_core(self, pairs, monkeypatch):
-        three = motions(pairs, "nystroem", 8)
+        three = motions(pairs, 8)
         monkeypatch.setattr(method, "MOST_CONTACT_RATIO", 0.0)
-        more = motions(pairs, "nystroem", 8)
+        more = motions(pairs, 8)
         assert three.acceleration.tobytes() != more.acceleration.tobytes()
         assert error(more, three).max() < 1e-3
 
@@ -101,35 +108,27 @@ class TestHelicalPairs:
     @pytest.fixture(scope="class")
     @classmethod
     def exact(cls, pairs):
-        return motions(pairs, "runge_kutta", FINE, AXIAL)
+        return reference(pairs, FINE, AXIAL)
 
     def test_motions(self, pairs, exact):
-        found = motions(pairs, "nystroem", 6, AXIAL)
+        found = motions(pairs, 6, AXIAL)
         assert error(found, exact).max() < 1e-3
-        assert error(found, motions(pairs[::-1], "nystroem", 6, AXIAL)).min() > 0.1
+        assert error(found, motions(pairs[::-1], 6, AXIAL)).min() > 0.1
 
-    def test_the_error_falls_with_the_step(self, pairs, exact):
+    def test_the_error_falls_with_the_step(self, pairs):
         """With its cube: what a change of chords within a step makes is corrected.
 
-        The classical scheme, which does not correct it, has the error of the step's square; the
-        reference is one of two evaluations therefore.
+        The classical scheme does not correct it and has the error of the step's square, so the
+        finest of two evaluations is the reference here.
         """
-        finest = motions(pairs, "nystroem", FINE, AXIAL)
+        finest = motions(pairs, FINE, AXIAL)
         coarse, fine = (
-            error(motions(pairs, "nystroem", steps, AXIAL), finest).max()
-            for steps in (6, 12)
+            error(motions(pairs, steps, AXIAL), finest).max() for steps in (6, 12)
         )
         assert math.log2(coarse / fine) > 2.5
 
-    def test_smaller_than_that_of_the_classical_scheme(self, pairs, exact):
-        found, classical = (
-            error(motions(pairs, backend, 6, AXIAL), exact).max()
-            for backend in ("nystroem", "runge_kutta")
-        )
-        assert found < 0.4 * classical
-
     def test_loads_of_the_teeth(self, pairs, exact):
-        found = motions(pairs, "nystroem", 20, AXIAL)
+        found = motions(pairs, 20, AXIAL)
         for machine, seen, other in zip(pairs, found.seen, exact.seen, strict=True):
             same = seen[0] == other[0]  # a pair enters a sample earlier or later
             assert same.mean() > 0.98
@@ -150,10 +149,10 @@ class TestPapersLaw:
         ]
 
     def test_motions(self, machine, dynamics_of, pairs):
-        found, exact = (motions(pairs, name, 32) for name in method_names())
+        found, exact = motions(pairs, 32), reference(pairs, 32)
         assert error(found, exact).max() < 1e-3
         other = dynamics_of(machine({**QUICK, **PAPER, **MORE_DAMPED}))
-        shown = motions([other], "nystroem", 32)
+        shown = motions([other], 32)
         assert in_band_error(shown.acceleration, exact.acceleration[:1], RATE)[0] > 5e-3
 
     def test_with_the_phase_prescribed_the_motion_is_proportional_to_the_torque(
@@ -167,19 +166,16 @@ class TestPapersLaw:
                 dynamics_of(machine({**words, TORQUE: torque}), MISSING)
                 for torque in (5, 40)
             ]
-            found[phase] = motions(pairs, "nystroem", 16).acceleration
+            found[phase] = motions(pairs, 16).acceleration
         small, large = found["prescribed"]
         assert np.allclose(large, 8.0 * small, rtol=0.0, atol=1e-6 * large.std())
         small, large = found["rotation"]
         assert np.std(large - 8.0 * small) > 0.1 * large.std()
 
-    def test_both_methods_prescribe_the_phase(self, machine, dynamics_of):
+    def test_the_phase_is_prescribed_as_by_the_classical_scheme(
+        self, machine, dynamics_of
+    ):
         words = {**QUICK, **PAPER, "mesh.phase": "prescribed"}
         pairs = [dynamics_of(machine(words), MISSING)]
-        found, exact = (motions(pairs, name, 32) for name in method_names())
+        found, exact = motions(pairs, 32), reference(pairs, 32)
         assert error(found, exact).max() < 2e-3
-
-
-def method_names():
-    """The two methods of gear pairs."""
-    return "nystroem", "runge_kutta"

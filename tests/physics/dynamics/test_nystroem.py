@@ -1,4 +1,4 @@
-"""Two evaluations of the mesh law a step: as accurate as the classical scheme, of its order."""
+"""Two evaluations of the mesh law a step: the motions of the classical scheme in fine steps."""
 
 import math
 from dataclasses import replace
@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fault_cases import one
-from stacked_motions import integrate
+from stacked_motions import exact_motions, integrate
 
 from gensig.dynamics.decimation import in_band_error
 from gensig.dynamics.integrator import Solver
@@ -18,6 +18,7 @@ RECORD = {
     "duration": 0.05,
     "channels": ("pinion_y", "wheel_x", "wheel_y", "pinion_rotation"),
 }
+FINE = 32  # steps a sample of the reference
 ACCURACY = 1e-3  # of a channel's spectrum at the default step
 # one well-damped drive: a short settling
 QUICK = {
@@ -64,9 +65,9 @@ def machines(machine, dynamics_of):
     return made
 
 
-def motions(machines, backend, oversampling, precision="float64", **more):
-    """Motions of machines by a backend; those with rotors apart from the others."""
-    solver = Solver(oversampling=oversampling, precision=precision, backend=backend)
+def motions(machines, oversampling, precision="float64", **more):
+    """Motions of machines by the default method."""
+    solver = Solver(oversampling=oversampling, precision=precision)
     return integrate(machines, solver, **{**RECORD, **more})
 
 
@@ -78,21 +79,21 @@ def pairs(machines):
 
 @pytest.fixture(scope="module")
 def exact(pairs):
-    return motions(pairs, "runge_kutta", 32, with_mesh_state=True)
+    return exact_motions(pairs, FINE, with_mesh_state=True, **RECORD)
 
 
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 def test_motions_are_those_of_the_classical_scheme(
     machine, dynamics_of, pairs, exact, precision
 ):
-    found = motions(pairs, "nystroem", 5, precision)
+    found = motions(pairs, 5, precision)
     error = in_band_error(found.acceleration, exact.acceleration, RATE)
     bounces = exact.contact_loss[:, 0] > 0.01
     assert error[~bounces].max() < ACCURACY
     assert error[bounces].max() < 1.5 * ACCURACY
 
     other = dynamics_of(machine({**QUICK, **MORE_DAMPED}))
-    shown = motions([other], "nystroem", 5, precision).acceleration
+    shown = motions([other], 5, precision).acceleration
     assert in_band_error(shown, exact.acceleration[:1], RATE)[0] > 5.0 * ACCURACY
 
     assert np.abs(found.angle - exact.angle).max() < 1e-5
@@ -105,15 +106,15 @@ def test_motions_are_those_of_the_classical_scheme(
 def test_motor_and_load_move_too(machines):
     channels = (*RECORD["channels"], "motor_rotation", "load_rotation")
     rotors = [machines["rotors"]]
-    found = motions(rotors, "nystroem", 5, channels=channels)
-    exact = motions(rotors, "runge_kutta", 32, channels=channels)
+    found = motions(rotors, 5, channels=channels)
+    exact = exact_motions(rotors, FINE, **{**RECORD, "channels": channels})
     error = in_band_error(found.acceleration, exact.acceleration, RATE)
     assert error.max() < ACCURACY
 
 
 def test_loads_of_the_teeth_are_those_of_the_classical_scheme(pairs, exact):
     """The pair that each row belongs to, and its force, in shares of the mean force."""
-    found = motions(pairs, "nystroem", 8, with_mesh_state=True)
+    found = motions(pairs, 8, with_mesh_state=True)
     for machine, seen, other in zip(pairs, found.seen, exact.seen, strict=True):
         same = seen[0] == other[0]  # a pair enters a sample earlier or later
         assert same.mean() > 0.99
@@ -127,10 +128,8 @@ def test_back_flanks_carry(machine, dynamics_of):
     errors = np.random.default_rng(8).normal(0, 3e-6, (2, 84))
     teeth = {"pinion_error": errors[0, :23], "wheel_error": errors[1]}
     machines = [dynamics_of(machine({**QUICK, **changes}), **teeth)]
-    found, exact = (
-        motions(machines, backend, 32, with_mesh_state=True).seen[0, 1]
-        for backend in ("nystroem", "runge_kutta")
-    )
+    found = motions(machines, FINE, with_mesh_state=True).seen[0, 1]
+    exact = exact_motions(machines, FINE, with_mesh_state=True, **RECORD).seen[0, 1]
     assert (exact < 0.0).mean() > 0.01
     assert abs((found < 0.0).mean() / (exact < 0.0).mean() - 1.0) < 0.2
 
@@ -139,9 +138,9 @@ def test_the_error_falls_with_the_fourth_power_of_the_step(machine, dynamics_of)
     """Against another machine it does not."""
     sound = dynamics_of(machine(QUICK))
     steps = (4, 16, 64)
-    coarse, fine, exact = (motions([sound], "nystroem", n).acceleration for n in steps)
+    coarse, fine, exact = (motions([sound], n).acceleration for n in steps)
     changed = replace(sound, start_phase=sound.start_phase + 1e-4)
-    other = motions([changed], "nystroem", 64).acceleration
+    other = motions([changed], 64).acceleration
 
     def order(reference):
         first, last = (
@@ -155,9 +154,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_step(machine, dynamics_of)
 
 def test_the_check_shows_the_error(pairs, exact):
     """The beginning at half the step differs from the record by about the record's error."""
-    solver = Solver(
-        oversampling=5, precision="float64", backend="nystroem", max_error=1e-3
-    )
+    solver = Solver(oversampling=5, precision="float64", max_error=1e-3)
     found = integrate(pairs[:3], solver, **RECORD)
     n_check = found.check.shape[-1]
     checked = in_band_error(found.acceleration[..., :n_check], found.check, RATE)

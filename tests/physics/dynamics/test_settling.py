@@ -2,19 +2,14 @@
 
 import re
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from fault_cases import one
 
-from gensig.dynamics.backends import group_motions, step_limits
-from gensig.dynamics.backends.base import BOUNCING
-from gensig.dynamics.backends.step_limits import (
-    COARSE,
-    coarsest_oversampling,
-    settling_stages,
-)
+from gensig.dynamics.backends import group_motions
+from gensig.dynamics.backends.base import BOUNCING, Integration
+from gensig.dynamics.backends.nystroem.method import THREE_PAIRS
 from gensig.dynamics.decimation import in_band_error
 from gensig.errors import SimulationError, StepError
 from gensig.faults.broken import MissingTooth
@@ -26,8 +21,6 @@ from gensig.systems.run import Run
 RATE = 51200.0
 LEFT = 5e-4  # of a spectrum; measured 4e-4 at 600 r/min, 3e-4 at other speeds
 SPEED = "operating.speed_rpm"
-# stable in longer steps than the default, in which landings fail
-CLASSICAL_SCHEME = {"solver.backend": "runge_kutta"}
 LINE = {
     "system.motor.inertia_kg_m2": 2e-3,
     "system.load.inertia_kg_m2": 0.05,
@@ -83,7 +76,7 @@ def runs(run):
 def steady(runs):
     """The same after 1.2 s of settling in fine steps."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(step_limits, "COARSE", ((16, 0.02),))
+        patch.setattr(group_motions, "SETTLING_STEPS", 5)
         patch.setattr(group_motions, "settling_time", lambda *_: 1.2)
         return simulate_together(runs)
 
@@ -116,57 +109,34 @@ def test_machines_that_begin_in_different_stages_are_independent(run, runs):
     assert_independent([*quick, *runs[:2]])
 
 
-def test_hard_landings_settle_in_finer_steps(run, runs, monkeypatch):
-    """Two teeth missing under 0.5 N m at 3600 r/min: too stiff for one step a sample."""
-    missing = [MissingTooth(gear="pinion", tooth=tooth) for tooth in (3, 4)]
-    changes = {"operating.torque_nm": 0.5, SPEED: 3600, **CLASSICAL_SCHEME}
-    bouncing = run(changes, missing)
-    bouncing = replace(bouncing, specimen=None, gearbox=None)
-    others = [run({SPEED: speed, **CLASSICAL_SCHEME}) for speed in (600, 1800)]
-    together = assert_independent([others[0], bouncing, others[1]])
-
-    assert together[1].contact_loss_fraction > BOUNCING
-
-    step = solver_steps(bouncing)
-    assert settling_steps([bouncing], monkeypatch) == [1, 3]
-
-    monkeypatch.setattr(group_motions, "CAREFUL", 1)
-    assert settling_steps([bouncing], monkeypatch) == [1, step]
-
-
-def solver_steps(run):
-    return run.system.solver.oversampling
-
-
-def settling_steps(runs, monkeypatch):
-    """Steps per sample of the first stage, in the order in which settling was tried."""
+def settling_steps(run, monkeypatch):
+    """Steps per sample in which a machine settled, in the order in which they were tried."""
     tried = []
-    run_stages = group_motions.run_stages
+    run_until = group_motions.run_until
 
-    def noted(run, lanes, begins, stages, steps):
-        tried.append(stages[0][0])
-        return run_stages(run, lanes, begins, stages, steps)
+    def noted(*arguments):
+        tried.append(arguments[-1])
+        return run_until(*arguments)
 
     with monkeypatch.context() as patch:
-        patch.setattr(group_motions, "run_stages", noted)
-        (record,) = simulate_together(runs)
+        patch.setattr(group_motions, "run_until", noted)
+        (record,) = simulate_together([run])
     assert not isinstance(record, SimulationError)
     return tried
 
 
 @pytest.fixture(scope="module")
 def landing(run):
-    """Two teeth missing under 0.2 N m at 3600 r/min, recorded at 5120 Hz, without noise."""
-    missing = [MissingTooth(gear="pinion", tooth=tooth) for tooth in (3, 4)]
+    """Three teeth missing under 0.1 N m at 3600 r/min, recorded at 5120 Hz, without noise."""
+    missing = [MissingTooth(gear="pinion", tooth=tooth) for tooth in (3, 4, 5)]
 
     def make(oversampling, max_error=None):
         changes = {
-            "operating.torque_nm": 0.2,
+            "operating.torque_nm": 0.1,
             SPEED: 3600,
             "sensing.sampling_rate_hz": 5120,
             "solver.oversampling": oversampling,
             "solver.max_error": max_error,
-            **CLASSICAL_SCHEME,
         }
         single = run(changes, missing)
         return replace(single, specimen=None, gearbox=None)
@@ -178,51 +148,53 @@ def landing(run):
 class TestLandingsTooHardForTheSettling:
     """A landing is as stiff as it is hard; the least stable step is that of the mean force."""
 
-    def test_they_settle_in_the_steps_of_the_record(self, landing, runs, monkeypatch):
-        single = landing(16)
+    def test_they_settle_in_the_steps_of_the_record(self, landing, monkeypatch):
+        single = landing(40)
         (record,) = simulate_together([single])
-        assert settling_steps([single], monkeypatch) == [9, 16]
+        assert settling_steps(single, monkeypatch) == [20, 40]
         assert record.contact_loss_fraction > BOUNCING
 
-        stages = tuple((16, before) for _, before in COARSE)
-        monkeypatch.setattr(step_limits, "COARSE", stages)
+        monkeypatch.setattr(group_motions, "SETTLING_STEPS", 40)
+        assert settling_steps(single, monkeypatch) == [40]
         (finer,) = simulate_together([single])
         assert record.acceleration.tobytes() == finer.acceleration.tobytes()
 
     def test_neighbours_keep_their_bits(self, landing, run):
-        rate = {"sensing.sampling_rate_hz": 5120, "solver.oversampling": 16}
-        rate |= CLASSICAL_SCHEME
-        assert_independent([run(rate), landing(16), run({**rate, SPEED: 900})])
+        rate = {"sensing.sampling_rate_hz": 5120, "solver.oversampling": 40}
+        assert_independent([run(rate), landing(40), run({**rate, SPEED: 900})])
 
     def test_too_long_steps_of_the_record_are_halved(self, landing):
         """With a limit of the error; without one the error says what to raise."""
-        (failed,) = simulate_together([landing(9)])
+        (failed,) = simulate_together([landing(20)])
         assert isinstance(failed, StepError)
-        told = "too long for their impacts; raise solver.oversampling above 9"
+        told = "too long for their impacts; raise solver.oversampling above 20"
         assert re.search(told, str(failed))
 
-        remedy = str(not_finite(landing(9, max_error=1.0), []))
+        remedy = str(not_finite(landing(20, max_error=1.0), []))
         assert "operating.torque_nm nearer to gear.rated_torque_nm" in remedy
         assert not re.search("(raise|lower) operating.torque_nm", remedy)
 
-        (record,) = simulate_together([landing(9, max_error=1.0)])
-        (finer,) = simulate_together([landing(18, max_error=1.0)])
+        (record,) = simulate_together([landing(20, max_error=1.0)])
+        (finer,) = simulate_together([landing(40, max_error=1.0)])
         assert record.acceleration.tobytes() == finer.acceleration.tobytes()
 
 
 @pytest.mark.filterwarnings("ignore::gensig.dynamics.integrator.CoarseStepWarning")
-def test_stages_become_finer_within_stability(dynamics_of, xiamen):
-    dynamics = dynamics_of(xiamen)
-    oversampling = xiamen.solver.oversampling
-
-    def steps(limit, rate):
-        least = coarsest_oversampling(dynamics, limit, rate)
-        return [steps for steps, _ in settling_stages(least, limit, rate)]
-
-    ends = [end for _, end in settling_stages(1, oversampling, RATE)]
-
-    assert all(first > second > 0 for first, second in pairwise(ends))
-    assert coarsest_oversampling(dynamics, oversampling, RATE) == 1
-    assert steps(oversampling, RATE) == [n for n, _ in COARSE]
-    assert steps(2, RATE) == [1, 2, 2]
-    assert steps(oversampling, RATE / 2) == [2, 2, 3]
+@pytest.mark.parametrize(
+    ("limit", "rate", "steps"), [(5, RATE, 3), (2, RATE, 2), (8, RATE / 4, 8)]
+)
+def test_the_settling_takes_coarse_steps_within_stability(
+    dynamics_of, xiamen, limit, rate, steps
+):
+    integration = Integration(
+        sampling_rate=rate,
+        duration=0.01,
+        channels=("pinion_y",),
+        with_mesh_state=False,
+        oversampling=limit,
+        precision="float64",
+        max_error=None,
+    )
+    machine = dynamics_of(xiamen)
+    found = group_motions.settling_steps(machine, integration, THREE_PAIRS)
+    assert found == steps

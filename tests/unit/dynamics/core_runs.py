@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from gensig.dynamics.backends.group_run import GroupRun
-from gensig.dynamics.backends.runge_kutta import CORE
+from gensig.dynamics.backends.nystroem.method import (
+    ANY_LAW,
+    THREE_PAIRS,
+    is_followed_by_three,
+)
 from gensig.dynamics.lanes import fill_lanes
 from gensig.faults.broken import MissingTooth
 from gensig.systems.base import simulate_together
@@ -65,6 +69,11 @@ def assert_independent(runs, orders):
         assert_same(together, [expected[k] for k in order])
 
 
+def core_of(machine):
+    """The core that integrates a machine."""
+    return THREE_PAIRS if is_followed_by_three(machine) else ANY_LAW
+
+
 class CoreRun(GroupRun):
     """Runs one group; the lanes start at rest in static equilibrium at ``first_step``."""
 
@@ -77,8 +86,9 @@ class CoreRun(GroupRun):
         precision="float64",
         first_step=0,
         span=(0.0, 0.0),
-        core=CORE,
+        core=None,
     ):
+        core = core or core_of(machines[0])
         self.machines = fill_lanes(machines, precision)
         self.step = step
         self.now = first_step

@@ -7,48 +7,8 @@ from closeness import assert_close
 from gensig.dynamics._tableau import (
     CUBIC_MIDDLE,
     NEWMARK,
-    RK4,
-    Tableau,
     average_acceleration,
 )
-
-ANGLES = np.linspace(0.05, 0.4, 8)  # omega h
-
-
-def stepped(scheme: Tableau, h: float) -> complex:
-    """One step h of the oscillator q'' = -q, from q = 1 at rest, as q_1 + i v_1."""
-    q = 1.0
-    v = 0.0
-    accelerations = []
-    stage_q = q
-    stage_v = v
-    for node in (*scheme.node[1:], 0.0):
-        a = -stage_q
-        accelerations.append(a)
-        stage_q = q + node * h * stage_v
-        stage_v = v + node * h * a
-    gained = h * scheme.share * np.dot(scheme.weight, accelerations)
-    moved = h * (v + h * scheme.share * np.dot(scheme.position, accelerations))
-    return complex(q + moved, v + gained)
-
-
-def order(scheme: Tableau) -> float:
-    """Order of a scheme: slope of the error of a step over its length, less one."""
-    exact = np.exp(-1j * ANGLES)
-    errors = np.abs([stepped(scheme, angle) for angle in ANGLES] - exact)
-    return float(np.polyfit(np.log(ANGLES), np.log(errors), 1)[0]) - 1.0
-
-
-def test_the_classical_scheme_is_of_fourth_order() -> None:
-    assert 3.9 < order(RK4) < 4.1
-
-    other = RK4._replace(weight=(1.0, 2.1, 1.9, 1.0), node=(0.0, 0.45, 0.45, 1.0))
-    assert order(other) < 2.5
-    assert sum(RK4.weight) * RK4.share == 1.0
-    assert sum(RK4.position) * RK4.share == 0.5
-
-    for values in (RK4.node, RK4.weight, RK4.position):
-        assert values[1] == values[2]  # the core reads one of them for both
 
 
 def test_the_middle_of_a_cubic_is_exact() -> None:

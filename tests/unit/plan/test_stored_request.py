@@ -4,6 +4,7 @@ import pytest
 import yaml
 from refusals import refused
 
+from gensig.cli import main
 from gensig.dataset.folder.beginning import config_text
 from gensig.dataset.folder.manifest import identity_hash
 from gensig.plan.make import make_plan
@@ -32,7 +33,7 @@ REQUESTS = {
         "plan.classes=[healthy,pitting]",
         "fault.vary={pit_width_mm: {distribution: uniform, low: 3, high: 5, levels: 2}}",
     ),
-    "backend": ("solver.backend=runge_kutta", "plan.fault_gear=drawn", "fault=crack"),
+    "drawn gear": ("plan.fault_gear=drawn", "fault=crack"),
 }
 
 
@@ -147,12 +148,22 @@ def test_a_file_of_a_stranger_is_data(content, message, tmp_path):
 
 
 def test_a_file_without_keys_that_came_later_has_their_values(stored):
-    file = stored(["plan.machines=crossed", "solver.backend=runge_kutta"])
+    file = stored(["plan.machines=crossed"])
     content = yaml.safe_load(file.read_text())
     assert "machines" not in content["plan"]
     config = read_request(["plan.machines=separate"], stored=file).config
     assert config["plan"]["machines"] == "separate"
-    assert config["solver"]["backend"] == "runge_kutta"
+
+
+def test_a_file_that_names_no_method_had_one_that_left(stored, capsys):
+    file = stored([])
+    content = yaml.safe_load(file.read_text())
+    del content["solver"]["backend"]
+    file.write_text(yaml.safe_dump(content))
+    assert main(["plan", "--config", str(file)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith("left with version 0.19; take solver.backend=nystroem")
+    assert main(["plan", "--config", str(file), "solver.backend=nystroem"]) == 0
 
 
 def test_a_missing_file_is_named(tmp_path):

@@ -1,7 +1,7 @@
 """Two-evaluation core for meshes of any law: chords of helical teeth, the paper's law, and spur
 pairs of which more than three touch.
 
-The motions are those of ``_motion``; tables and law are those of the classical core.
+The motions are those of ``_motion``; tables and law are in ``_tables`` and ``_mesh_kernels``.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from gensig.dynamics._equations import (
     recenter,
     set_out,
 )
-from gensig.dynamics._kernels import (
+from gensig.dynamics._layout import AHEAD, BASE, EVEN, MIDDLE, ODD, ROLL, is_helical
+from gensig.dynamics._mesh_kernels import mesh_law
+from gensig.dynamics._record_kernels import integrates
+from gensig.dynamics._slots import (
     keep_begin,
     near_pairs,
     roll_ahead,
     write_mesh,
 )
-from gensig.dynamics._layout import AHEAD, BASE, EVEN, MIDDLE, ODD, ROLL, is_helical
-from gensig.dynamics._mesh_kernels import mesh_law
-from gensig.dynamics._record_kernels import integrates
 from gensig.dynamics._tables import between, chords_between, cover, gather
 from gensig.dynamics._vector import (
     any_above,
@@ -86,7 +86,7 @@ def integrate(
     wide,
     near,
 ):
-    """Advance every lane by ``n_steps``; parameters are those of ``gensig.dynamics._kernels``.
+    """Advance every lane by ``n_steps``; parameters are those of ``_record_kernels.integrate``.
 
     The scheme is that of ``nystroem._kernels``.
     """

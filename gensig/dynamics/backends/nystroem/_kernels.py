@@ -77,7 +77,7 @@ def integrate(
     wide,
     near,
 ):
-    """Advance every lane by ``n_steps``; parameters are those of ``gensig.dynamics._kernels``.
+    """Advance every lane by ``n_steps``; parameters are those of ``_record_kernels.integrate``.
 
     The law is evaluated in the middle and at the end of a step. The state in the middle follows
     from the accelerations that the step before has left; its own acceleration predicts the end.

@@ -7,10 +7,10 @@ The machine is that of ``_line_kernels``; tables, law and kinks of its meshes ar
 from __future__ import annotations
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._kernels import keep_begin, near_pairs, roll_ahead, write_mesh
 from gensig.dynamics._layout import AHEAD, BASE, EVEN, MIDDLE, ODD, PART, ROLL
 from gensig.dynamics._mesh_kernels import mesh_law
 from gensig.dynamics._record_kernels import integrates
+from gensig.dynamics._slots import keep_begin, near_pairs, roll_ahead, write_mesh
 from gensig.dynamics._tables import between, chords_between, cover, gather
 from gensig.dynamics._vector import (
     any_above,

@@ -91,7 +91,7 @@ def integrate(
     wide,
     near,
 ):
-    """Advance every lane by ``n_steps``; parameters are those of ``gensig.dynamics._kernels``.
+    """Advance every lane by ``n_steps``; parameters are those of ``_record_kernels.integrate``.
 
     ``lost`` has one row for every mesh. ``angle`` takes as many rows a sample as the group has
     angles, ``seen`` the rows of every mesh.

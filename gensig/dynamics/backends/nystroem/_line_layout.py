@@ -24,9 +24,7 @@ N_BLOCKS = ON + 1
 # row of a spur mesh, which one pair holds in registers: roll over the step at whose end the nodes
 # were read
 AHEAD = layout.AHEAD
-BEGUN = (
-    layout.STEP_APPROACH
-)  # row of a mesh: rotation of gear a at the begin of the step
+BEGUN = layout.BEGUN
 # of the machine: pull of the governor on each of ``held``; no torque has a row of its own
 PULL = rows.DRIVE + layout.DRIVE_TORQUE
 # integer row of a mesh with chords: 1 in its first place if a pair or a chord changes in the step
