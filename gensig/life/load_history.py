@@ -49,11 +49,6 @@ class History:
                 "the speeds and torques of a history must be positive; a standstill is a gap"
             )
 
-    @property
-    def running(self) -> Array:
-        """Time that the machine has run when each block ends, (block,) s."""
-        return np.cumsum(self.end - self.begin)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DrawnBlocks:

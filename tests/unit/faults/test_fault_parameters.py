@@ -10,6 +10,7 @@ from refusals import refused
 
 from gensig.errors import ConfigError, FaultError, GensigError
 from gensig.faults.base import faulty_teeth
+from gensig.faults.broken import MissingTooth
 from gensig.faults.registry import COMPOUND, FAULTS, fault_parts, read_faults
 from gensig.options.groups import options
 from gensig.systems.pair_machine import severity
@@ -292,6 +293,12 @@ def test_refusals(xiamen, monkeypatch, words, text):
         text = "200 " + text
     with refused(text, GensigError):
         faulty_teeth(xiamen.pair, [typed(words)])
+
+
+@pytest.mark.parametrize("gear", [3, "", None])
+def test_a_gear_has_a_name(gear):
+    with pytest.raises(FaultError, match="must be the name of a gear"):
+        MissingTooth(gear=gear, tooth=0)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -47,6 +47,13 @@ def test_share_is_right_on_the_average_for_any_number_of_turns(n_turns):
     assert_allclose(np.mean(result), 0.25, atol=0.01)
 
 
+def test_share_of_every_channel_is_that_of_it_alone():
+    turns = TURNS + np.array([0.5, 1.0, 2.0])[:, None, None] * NOISE
+    result = nonsynchronous_share(turns)
+    assert_allclose(result, [nonsynchronous_share(each) for each in turns])
+    assert (np.diff(result) > 0.1).all()
+
+
 def test_share_of_pure_turns_noise_silence_and_one_turn():
     assert_allclose(nonsynchronous_share(TURNS + 7.0), 0.0, atol=1e-12)
     assert_allclose(nonsynchronous_share(NOISE), 1.0, atol=0.03)

@@ -10,9 +10,11 @@ from machines import GRADE, RATE, SPEED, TEETH, drifting, measured
 from gensig.cli import main
 from gensig.dataset.reader import open_dataset
 from gensig.plan.request import read_request
+from gensig.record.simulate import simulate_records
 from gensig.signals.mesh_motion import Teeth
 from gensig.signals.recording import Recording
 from gensig.signals.transfer.path_gain import gain_at, minimum_phase
+from gensig.twin import check
 from gensig.twin.speed import find_motion
 from gensig.twin.writing import DEFAULT_OVERSAMPLING
 
@@ -38,7 +40,16 @@ def twin(known, tmp_path_factory):
     np.savez(file, acceleration=known.signal)
     teeth = ("--teeth", *map(str, TEETH))
     rates = ("--speed", f"{WRONG_START:g}", "--rate", f"{RATE:g}")
-    assert main(["twin", file, *teeth, *rates, "--out", str(folder / "mine")]) == 0
+    compared = []
+
+    def noted(*given):
+        compared.extend(given[-1])
+        return simulate_records(*given)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(check, "simulate_records", noted)
+        assert main(["twin", file, *teeth, *rates, "--out", str(folder / "mine")]) == 0
+    assert len({row["unit_id"] for row in compared}) == check.N_RECORDS
     return folder / "mine"
 
 

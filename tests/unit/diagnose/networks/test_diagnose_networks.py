@@ -73,6 +73,20 @@ def test_scores_have_their_shape_for_any_window(name, shape):
     assert model(torch.zeros(3, *shape)).shape == (3, 4)
 
 
+def test_the_loss_counts_windows_by_the_weight_of_their_class():
+    """Weighted mean of the negative logarithms of the probabilities of the true classes."""
+    model = make_model("cnn", n_classes=3)
+    windows, label = torch.randn(6, 1, 2048), torch.tensor([0, 0, 0, 0, 1, 2])
+    weight = torch.tensor([0.5, 1.0, 4.0])
+    with torch.no_grad():
+        logarithm = torch.log_softmax(model(windows), dim=1)
+        loss = model.loss(windows, label, {}, weight)
+    missed = -logarithm[torch.arange(6), label]
+    expected = (weight[label] * missed).sum() / weight[label].sum()
+    torch.testing.assert_close(loss, expected)
+    assert abs(loss - missed.mean()) > 1e-3
+
+
 def test_a_window_too_short_for_the_network_is_refused_before_training(dataset):
     with pytest.raises(ConfigError, match="window_samples=1023 is too short"):
         check_example(make_model("wdcnn"), np.zeros((1, 1, 1023), dtype=np.float32))
