@@ -111,6 +111,7 @@ def record(
     fresh,
     step,
     first_step,
+    n_before,
     n_samples,
     factor,
     taps,
@@ -124,10 +125,11 @@ def record(
     wide,
     near,
 ):
-    """Integrate and decimate block by block, so that the internal rate stays in the cache.
+    """Integrate ``n_before`` steps from ``first_step`` on, and then samples, if any.
 
-    ``out`` (lane, channel, sample) float64 takes ``n_samples``; the first tap of the first sample
-    is at the step after ``first_step``. ``means`` is a scratch for the steps of a block, and
+    Samples are integrated and decimated block by block, so that the internal rate stays in the
+    cache. ``out`` (lane, channel, sample) float64 takes ``n_samples``; the first tap of the first
+    sample is at the step after those before. ``means`` is a scratch for the steps of a block, and
     ``narrow`` one of ``narrow_steps`` steps of ``step_rows`` rows, of which the last ``BLOCK`` take
     samples.
     """
@@ -135,9 +137,11 @@ def record(
     per_step, n_rows = n * n_channels, step_rows(n * n_channels, width(narrow))
     n_kept = len(taps) - (2 * TOGETHER - 1) * factor
     angle_row, now, done = 0, first_step, 0
+    if n_samples == 0:
+        angle_row = -1
     samples = n_kept + BLOCK * factor
-    # one step, then the input of the first sample before its last steps, then block by block
-    n_steps, out_row, first_row = 1, -1, 0
+    # steps before, then the input of the first sample before its last steps, then block by block
+    n_steps, out_row, first_row = n_before, -1, 0
     while True:
         angle_row = integrate(
             group,

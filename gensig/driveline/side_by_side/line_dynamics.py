@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from gensig.driveline.running import RunningLine
 from gensig.driveline.side_by_side.line_pairs import mesh_pair
+from gensig.driveline.side_by_side.line_statics import line_at_rest
 from gensig.driveline.time.mesh_friction import slide_direction
-from gensig.driveline.time.newmark import static_start
 from gensig.dynamics.backends.nystroem.method import is_followed_by_three
 from gensig.dynamics.backends.nystroem.stability import stable_rate
 from gensig.dynamics.backends.step_limits import LONGEST_SETTLING, SETTLED
@@ -122,20 +122,31 @@ class LineDynamics:
         return int(np.argmin(np.abs(self.running.line.rotation - 1.0)))
 
     def static_start(self, time: float) -> Array:
-        """Deflection under the mean torques at a nominal time, (dof,)."""
-        running = self.running
-        return static_start(running.line, running.course, running.torques, time=time)
+        """Deflection under the mean torques at a nominal time, without friction, (dof,).
+
+        Under a nominal acceleration it is that of the accelerated line.
+        """
+        line, course = self.running.line, self.running.course
+        angle = float(course.nominal(np.array([time]))[0][0])
+        force = self._torques(np.array([time]))[0]
+        force -= line.mass @ line.rotation * course.acceleration(time)
+        return line_at_rest(line, self.pairs, angle, force)
 
     def forces(self, times: Array) -> Array:
         """Torques and forces on the degrees of freedom at times in s, (time, dof)."""
+        forces = self._torques(times)
+        if self.running.line.friction_torque is not None:
+            forces += self.running.line.friction_torque
+        return forces
+
+    def _torques(self, times: Array) -> Array:
+        """The same without what makes up for friction."""
         forces = np.zeros((len(times), len(self.dofs)))
         for torque in self.running.torques:
             factor: Array | float = 1.0
             if torque.factor is not None:
                 factor = np.interp(times, self.running.course.time, torque.factor)
             forces[:, torque.dof] += float(torque.table.mean()) * factor
-        if self.running.line.friction_torque is not None:
-            forces += self.running.line.friction_torque
         return forces
 
 

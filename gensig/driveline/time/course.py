@@ -61,6 +61,11 @@ class LineCourse:
         """Angle in rad and speed in rad/s of the reference at times in s, (time,) each."""
         return _at(self.knots, times)
 
+    def acceleration(self, time: float) -> float:
+        """Acceleration of the reference at a time in s, rad/s2; that after a knot at the knot."""
+        knot = int(np.searchsorted(self.time, time, side="right")) - 1
+        return float(self.knots.gain[knot]) if knot >= 0 else 0.0
+
 
 def constant_speed(speed: float) -> LineCourse:
     """The course of a reference that turns at one speed in rad/s."""

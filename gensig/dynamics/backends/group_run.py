@@ -30,6 +30,8 @@ class Dynamics(Protocol):
         """Deflection at rest at a nominal time, (dof,)."""
 
 
+NOTHING = np.empty(0)
+NO_TAPS = np.empty(0, dtype=LOW_PASS_PRECISION)
 DynamicsT = TypeVar("DynamicsT", bound=Dynamics)
 
 
@@ -106,8 +108,7 @@ class GroupRun:
 
     def advance(self, group: Any, step: float, first_step: int, n_steps: int) -> None:
         """Integrate; the next call continues from there unless lanes are marked as fresh."""
-        nothing = np.empty(0)
-        self.core.integrate(
+        _record_kernels.record(
             group,
             self.state.ravel(),
             self.lost.ravel(),
@@ -115,18 +116,19 @@ class GroupRun:
             step,
             first_step,
             n_steps,
-            self.channels,
-            nothing.astype(self.precision),
-            -1,
-            nothing,
-            -1,
+            0,
             1,
-            nothing,
+            NO_TAPS,
+            self.channels,
+            NOTHING,
+            NOTHING,
+            NOTHING,
+            NOTHING.astype(self.precision),
+            NO_TAPS,
             self.work,
             self.wide,
             self.near,
         )
-        self.fresh[:] = 0.0
 
     def record(
         self,
@@ -165,6 +167,7 @@ class GroupRun:
             self.fresh,
             step,
             -margin * factor - 1,
+            1,
             n_samples,
             factor,
             taps,

@@ -1,0 +1,90 @@
+"""A line at rest: its meshes carry the set torques, and both methods find the same deflection."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lane_tools import law_of
+from numpy.testing import assert_allclose
+
+from gensig.driveline.side_by_side.line_records import dynamics_of
+from gensig.driveline.side_by_side.line_statics import line_at_rest
+from gensig.driveline.time.newmark import static_start
+from gensig.plan.make import make_plan
+from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
+
+FEW = "plan.n_records=5", "plan.n_units=5"
+RAMPS = (
+    "operating.speed_profile=[[-0.4,0.4],[0.4,1.6]]",
+    "operating.torque_profile=[[-0.4,0.6],[0.4,1.4]]",
+)
+LINES = {
+    "spur": ("experiment=two_stage",),
+    "changing speed and torque": ("experiment=two_stage", *RAMPS),
+    "helical": ("system=phm09_helical_two_stage", "plan.classes=[missing_tooth]"),
+}
+
+
+@pytest.fixture(scope="module", params=LINES)
+def line(request):
+    """One of the lines, its gears with the errors of their grade."""
+    config = read_request([*LINES[request.param], *FEW]).config
+    record = make_plan(config).record(3)
+    return dynamics_of(InputReader(config).inputs(record).run)
+
+
+@pytest.mark.parametrize("time", [-0.3, 0.2])
+def test_it_is_where_the_implicit_method_has_it(line, time):
+    running = line.running
+    expected = static_start(running.line, running.course, running.torques, time=time)
+    found = line.static_start(time)
+    assert_allclose(found, expected, rtol=0.0, atol=1e-7 * np.abs(expected).max())
+    assert np.abs(line.static_start(time + 1e-3) - expected).max() > 1e-7
+
+
+def test_the_teeth_carry_what_the_springs_do_not(line):
+    """By the mesh law of the compiled core."""
+    force, running = still_forces(line), line.running.line
+    still = line_at_rest(running, line.pairs, 0.0, force)
+    carried = force - running.stiffness @ still
+    for mesh, pair, load in zip(
+        running.meshes, line.pairs, loads_of(running, carried), strict=True
+    ):
+        radius = pair.table.pair.pinion.base_radius
+        roll = pair.start_roll + radius * still[mesh.roll_dof]
+        found = law_of(pair)(roll, mesh.direction @ still, 0.0, 0.0)[0]
+        assert_allclose(found, load, rtol=1e-4)
+        assert load > 0.5 * pair.mesh_force
+
+
+def loads_of(line, carried):
+    """Mesh forces that make up forces on the degrees of freedom."""
+    reach = np.stack([mesh.direction for mesh in line.meshes])
+    loads = np.linalg.lstsq(reach.T, carried, rcond=None)[0]
+    assert_allclose(reach.T @ loads, carried, atol=1e-6 * np.abs(loads).max())
+    return loads
+
+
+def still_forces(line):
+    """The torques at time 0, where those that change are the set ones, without friction."""
+    return line.forces(np.zeros(1))[0] - line.running.line.friction_torque
+
+
+def test_a_free_line_is_at_rest_in_the_motion_that_nothing_balances(line):
+    running = line.running.line
+    free = replace(running, stiffness=without_governor(running), held=None)
+    force = still_forces(line)
+    force[0] += 5.0  # N m more than the load takes
+    deflection = line_at_rest(free, line.pairs, 0.0, force)
+    rigid = free.mass @ free.rotation
+    share = (force @ free.rotation) / (rigid @ free.rotation)
+    pushed = force - share * rigid - free.stiffness @ deflection
+    assert (loads_of(free, pushed) > 0.0).all()
+
+
+def without_governor(line):
+    """Stiffness of a line less that of its governor."""
+    if line.held is None:
+        return line.stiffness
+    return line.stiffness - np.outer(line.held, line.held)
