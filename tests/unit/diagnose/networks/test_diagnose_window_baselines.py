@@ -17,6 +17,7 @@ from diagnose.baselines.minirocket import (
     rocket_tables,
 )
 from diagnose.baselines.nearest_spectrum import NearestSpectrum, spectrum_table
+from diagnose.baselines.window_features import over_stretches
 from diagnose.data.windows import SUBSETS
 
 
@@ -35,6 +36,21 @@ def make_sets(**changes):
     dataset = FakeDataset(**values)
     task = task_on(dataset, 1000)
     return dict(zip(SUBSETS, windows_of(task, *SUBSETS), strict=True)), task
+
+
+def test_every_feature_of_a_stretch_is_the_mean_of_its_windows_and_has_a_name():
+    sets, _ = make_sets()
+    train = sets["train"]
+
+    def level_and_mean(windows):
+        return np.stack([windows.std(axis=(1, 2)), windows.mean(axis=(1, 2))], axis=1)
+
+    table = over_stretches(train, level_and_mean, "feature")
+    assert table.names == ("feature_0", "feature_1")
+    assert table.values.shape == (len(table.label), 2)
+    cut = level_and_mean(train.cut(np.arange(len(train.label))))
+    first = train.segment == train.segment.min()
+    assert_allclose(table.values[0], cut[first].mean(axis=0), rtol=1e-6)
 
 
 def test_kernels_are_the_84_and_see_no_offset():
