@@ -316,6 +316,36 @@ class TestShareOverSlices:
         assert lifted.min() == 0
         assert lifted.max() >= 3
 
+    def test_a_node_does_not_depend_on_the_nodes_before_it(
+        self, law, bending, random_face
+    ):
+        """The slices are sorted from the last node's order, equal gaps by their index."""
+        slice_gap, width, load = random_face
+        equal = np.round(slice_gap / UM) * UM
+        assert min(len(np.unique(column)) for column in equal.T) < len(equal)
+
+        together = shared(law, equal, width, load, bending)
+        for k in range(len(load)):
+            alone = ContactLaw(
+                factor=law.factor,
+                constant=law.constant[k : k + 1],
+                log_weight=law.log_weight,
+            )
+            here = slice(k, k + 1)
+            result = shared(alone, equal[:, here], width, load[here], bending)
+            np.testing.assert_array_equal(result, np.array(together)[:, here])
+
+    def test_the_order_of_slices_across_the_face_does_not_matter(
+        self, law, bending, random_face
+    ):
+        slice_gap, width, load = random_face
+        gap, compliance = shared(law, slice_gap, width, load, bending)
+        for order in (np.arange(12)[::-1], np.random.default_rng(5).permutation(12)):
+            faces = slice_gap[order], width[order]
+            moved_gap, moved = shared(law, *faces, load, bending)
+            np.testing.assert_array_equal(moved_gap, gap)
+            assert_close(moved, compliance, 1e-11)
+
 
 def test_bearing_width_narrows_as_the_paper_has_it(xiamen):
     fault = one("pitting", tooth=0, pit_width_mm=6)
