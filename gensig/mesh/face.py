@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,12 +42,6 @@ def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) ->
     )
     center, relative_radius = different**2 / (2.0 * base), relative_radius[first]
     standing_back = tooth.material_loss + tooth.flank_deviation
-
-    def envelope(rows: Array) -> Array:
-        gap = np.empty((len(rows), len(center)))
-        lower_envelope(np.ascontiguousarray(rows), arc, center, relative_radius, gap)
-        return gap
-
     level = standing_back[:, :1]
     even = np.all(standing_back == level, axis=1)
     gap = np.repeat(level, len(center), axis=1)
@@ -53,9 +49,31 @@ def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) ->
         shapes, which, moved = _shapes(standing_back[~even])
         # the end of a nominal flank touches
         beyond = np.maximum(np.maximum(center - arc[-1], arc[0] - center), 0.0)
-        uneven = envelope(shapes) - beyond**2 / (2.0 * relative_radius)
+        nodes = arc.tobytes(), center.tobytes(), relative_radius.tobytes()
+        touched = np.stack([_envelope(shape.tobytes(), *nodes) for shape in shapes])
+        uneven = touched - beyond**2 / (2.0 * relative_radius)
         gap[~even] = uneven[which] + moved
     return gap[:, inverse]
+
+
+# a record needs the flanks of its unit again, at other loads; 128 rows of 512 nodes a pitch, with
+# what they are known by, take 6 MB
+@lru_cache(maxsize=128)
+def _envelope(
+    standing_back: bytes, arc: bytes, center: bytes, relative_radius: bytes
+) -> Array:
+    """Lower envelope of one slice, (node,) m, read-only.
+
+    The arguments are the bytes of those of ``lower_envelope``: kept by content.
+    """
+    back, *nodes = (
+        np.frombuffer(values).copy()  # as the compiled function takes them
+        for values in (standing_back, arc, center, relative_radius)
+    )
+    gap = np.empty((1, len(nodes[1])))
+    lower_envelope(back[None], *nodes, gap)
+    gap.flags.writeable = False
+    return gap[0]
 
 
 def _shapes(standing_back: Array) -> tuple[Array, NDArray[np.int64], Array]:

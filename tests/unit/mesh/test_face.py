@@ -2,6 +2,7 @@
 flanks against both.
 """
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from scipy.optimize import brentq
 from gensig.faults.base import faulty_teeth
 from gensig.geometry.contact import corner_gap_by_pinion
 from gensig.geometry.tooth import healthy_tooth
+from gensig.mesh import face
 from gensig.mesh._kernels import lower_envelope, share_over_slices
 from gensig.mesh.face import bearing_width, is_nominal, slice_gaps
 from gensig.mesh.local_contact import ContactLaw, linear_contact, weber_contact
@@ -201,6 +203,84 @@ class TestRigidFlanks:
         at = tooth.profile.curvature_radius[-1] * np.linspace(0.5, 1.2, 50)
         gaps = slice_gaps(tooth, at, np.full(50, 5e-3))
         assert_close(gaps, -7 * UM, 1e-12)
+
+
+class TestKeptEnvelopes:
+    """Envelopes kept by content: the bits of those computed anew, in bounded memory."""
+
+    @pytest.fixture
+    def at(self, xiamen):
+        """Curvature radii of contact, on the flank and beyond its tip."""
+        tip = healthy_tooth(xiamen.pair.pinion).profile.curvature_radius[-1]
+        return tip * np.linspace(0.5, 1.2, 50)
+
+    @pytest.fixture
+    def teeth(self, xiamen):
+        """A tooth with a wavy flank for each seed."""
+        sound = healthy_tooth(xiamen.pair.pinion)
+        n_profile = len(sound.profile.curvature_radius)
+
+        def wavy(seed):
+            waves = np.random.default_rng(seed).uniform(0.0, 20 * UM, (2, n_profile))
+            return sound.split(np.array([8e-3])).with_deviation(waves)
+
+        return wavy
+
+    @staticmethod
+    def anew(tooth, at, radius):
+        """Gaps with an empty store."""
+        face._envelope.cache_clear()
+        return slice_gaps(tooth, at, radius)
+
+    def test_kept_and_computed_anew_are_equal_bits(self, teeth, at):
+        radius = np.full(len(at), 5e-3)
+        computed = self.anew(teeth(1), at, radius)
+        n_computed = face._envelope.cache_info().misses
+        np.testing.assert_array_equal(slice_gaps(teeth(1), at, radius), computed)
+        assert face._envelope.cache_info().misses == n_computed == 2
+
+    @pytest.mark.parametrize("changed", ["deviation", "curvature", "radius", "outline"])
+    def test_what_was_kept_of_other_flanks_is_not_served(self, teeth, at, changed):
+        """One number of one input is another by a thousandth: in place, so that no object is.
+
+        It is at the node of the flank that stands out furthest, or at a contact.
+        """
+        tooth, radius = teeth(1), np.full(len(at), 5e-3)
+        curvature = tooth.profile.curvature_radius.copy()
+        tooth = replace(
+            tooth, profile=replace(tooth.profile, curvature_radius=curvature)
+        )
+        before = self.anew(tooth, at, radius)
+        inputs = {
+            "deviation": tooth.flank_deviation[1],
+            "curvature": at,
+            "radius": radius,
+            "outline": curvature,
+        }
+        half = len(curvature) // 2
+        node = half + np.argmin(tooth.flank_deviation[1, half:])
+        place = {"deviation": node, "outline": node}.get(changed, len(at) // 2)
+        inputs[changed][place] *= 1.001
+        served = slice_gaps(tooth, at, radius)
+        np.testing.assert_array_equal(served, self.anew(tooth, at, radius))
+        assert (served != before).any()
+
+    def test_writing_into_a_result_changes_no_later_one(self, teeth, at):
+        radius = np.full(len(at), 5e-3)
+        first = self.anew(teeth(1), at, radius)
+        expected = first.copy()
+        first[:] = 0.0
+        np.testing.assert_array_equal(slice_gaps(teeth(1), at, radius), expected)
+
+    def test_threads_share_a_bounded_store(self, teeth, at):
+        most = face._envelope.cache_info().maxsize
+        radius, seeds = np.full(len(at), 5e-3), np.arange(most) % (most * 2 // 3)
+        expected = [self.anew(teeth(seed), at, radius) for seed in seeds]
+        face._envelope.cache_clear()
+        with ThreadPoolExecutor(4) as pool:
+            gaps = pool.map(lambda seed: slice_gaps(teeth(seed), at, radius), seeds)
+        np.testing.assert_array_equal(list(gaps), expected)
+        assert face._envelope.cache_info().currsize == most
 
 
 def shared(law: ContactLaw, slice_gap, width, load, bending):
