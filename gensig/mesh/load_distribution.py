@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import Tooth
 from gensig.material import Material
+from gensig.mesh._static_kernels import add_teeth, share_over_pairs
 from gensig.mesh.modification import PLAIN, PairModification
 from gensig.mesh.options import MeshOptions
 from gensig.mesh.pair_table import N_PAIRS, PairTable, pair_table
@@ -53,7 +54,7 @@ def cells(nodes: Array, position: Array) -> tuple[NDArray[np.int64], Array]:
     scaled = (position - nodes[0]) * (n_cells / (nodes[-1] - nodes[0]))
     scaled = np.clip(scaled, 0.0, n_cells)
     cell = np.minimum(scaled.astype(np.int64), n_cells - 1)
-    return cell, scaled - cell
+    return np.maximum(cell, 0), scaled - cell
 
 
 def pair_states(
@@ -79,6 +80,7 @@ def pair_states(
     index = newest[:, None] + 1 - np.arange(N_PAIRS)
     position = roll[:, None] - index * pitch
     cell, part = cells(table.position, position)
+    beyond = position - table.pair.pitch_point
     compliance = np.full(position.shape, -table.shared_compliance)
     gap = np.zeros(position.shape)
     sides = (
@@ -86,18 +88,28 @@ def pair_states(
         (table.wheel, start_tooth_wheel, wheel_error, wheel_tilt),
     )
     for side, start, error, tilt in sides:
-        teeth = (index + start) % len(side.kind)
-        kinds = side.kind[teeth]
-        if error is not None:
-            gap += error[teeth]
-        if tilt is not None:
-            gap += tilt[teeth] * (position - table.pair.pitch_point)
-        low, high = (kinds, cell), (kinds, cell + 1)
-        soft, back = side.compliance, side.gap
-        compliance += (1.0 - part) * soft[low] + part * soft[high]
-        gap += (1.0 - part) * back[low] + part * back[high]
-        gap[~side.present[kinds]] = np.inf
+        n_teeth = len(side.kind)
+        add_teeth(
+            index + start,
+            cell,
+            part,
+            beyond,
+            side.kind,
+            side.present,
+            side.compliance,
+            side.gap,
+            _of_teeth(error, n_teeth),
+            _of_teeth(tilt, n_teeth),
+            compliance,
+            gap,
+        )
     return PairStates(compliance=compliance, gap=gap, position=position)
+
+
+def _of_teeth(values: Array | None, n_teeth: int) -> Array:
+    """Values of a gear's teeth, (tooth,); 0 for None, ValueError for another number of teeth."""
+    nothing = np.zeros(n_teeth)
+    return nothing if values is None else nothing + values
 
 
 def static_mesh(table: PairTable, states: PairStates, force: float) -> StaticMesh:
@@ -111,27 +123,12 @@ def static_mesh(table: PairTable, states: PairStates, force: float) -> StaticMes
         end = table.pair.path_of_contact
         on_path = (states.position >= 0.0) & (states.position <= end)
         gap = np.where(on_path & np.isfinite(gap), 0.0, np.inf)
-    order = np.argsort(gap, axis=1, kind="stable")
-    sorted_gap = np.take_along_axis(gap, order, axis=1)
-    compliance = np.take_along_axis(states.compliance, order, axis=1)
-    touching = np.isfinite(sorted_gap)
-    stiffness = np.cumsum(np.where(touching, 1.0 / compliance, 0.0), axis=1)
-    closing = np.where(touching, sorted_gap, 0.0) / compliance
-    # approach less the shared deflection if the first m pairs carry
-    with np.errstate(divide="ignore"):
-        local = (force + np.cumsum(closing, axis=1)) / stiffness
-    carried = (local > sorted_gap).sum(axis=1)
-    last = np.maximum(carried - 1, 0)
-    rows = np.arange(len(last))
-    total, approach = stiffness[rows, last], local[rows, last]
-    lost = carried == 0
-    deflection = np.where(lost, 0.0, approach)[:, None] - gap
-    load = np.maximum(deflection, 0.0) / states.compliance
-    return StaticMesh(
-        approach=np.where(lost, np.inf, approach + table.shared_compliance * force),
-        load=np.where(lost[:, None], 0.0, load),
-        stiffness=np.where(lost, 0.0, total / (1.0 + table.shared_compliance * total)),
-    )
+    n_phases = len(gap)
+    approach, load = np.empty(n_phases), np.empty_like(gap)
+    stiffness = np.empty(n_phases)
+    given = states.compliance, gap, force, table.shared_compliance
+    share_over_pairs(*given, approach, load, stiffness)
+    return StaticMesh(approach=approach, load=load, stiffness=stiffness)
 
 
 def loaded_pair_table(
@@ -181,7 +178,8 @@ def _sound_states(table: PairTable) -> PairStates:
     """Healthy tooth pairs at every node of one pitch, in order of entry."""
 
     def of_pairs(nodes: Array) -> Array:
-        return nodes[:-1].reshape(N_PAIRS, table.options.points_per_pitch).T
+        by_pair = nodes[:-1].reshape(N_PAIRS, table.options.points_per_pitch)
+        return np.ascontiguousarray(by_pair.T)
 
     both = table.pinion.compliance[0] + table.wheel.compliance[0]
     return PairStates(

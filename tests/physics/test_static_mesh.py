@@ -65,6 +65,87 @@ def violation(states, static, shared, force):
     return max(breaches)
 
 
+class TestPairStates:
+    @pytest.fixture
+    def errors(self, xiamen):
+        """Errors in m and tilts in m/m of all teeth, as arguments of ``pair_states``."""
+        rng = np.random.default_rng(4)
+        scales = {"error": 5e-6, "tilt": 3e-4}
+        return {
+            f"{side}_{name}": rng.normal(0.0, scale, gear.n_teeth)
+            for side, gear in xiamen.pair.gears.items()
+            for name, scale in scales.items()
+        }
+
+    @staticmethod
+    def plain(table, roll, starts, errors):
+        """Compliance and gap of the four pairs at one roll, read tooth by tooth."""
+        pitch = table.pair.base_pitch
+        newest = int(np.floor(roll / pitch)) + 1
+        for number in range(newest, newest - 4, -1):
+            position = roll - number * pitch
+            compliance, gap = -table.shared_compliance, 0.0
+            for side in GEARS:
+                teeth = getattr(table, side)
+                tooth = (number + starts[side]) % len(teeth.kind)
+                row = teeth.kind[tooth]
+                nodes = position, table.position
+                compliance += np.interp(*nodes, teeth.compliance[row])
+                gap += (
+                    np.interp(*nodes, teeth.gap[row]) + errors[f"{side}_error"][tooth]
+                )
+                tilt = errors[f"{side}_tilt"][tooth]
+                gap += tilt * (position - table.pair.pitch_point)
+                if not teeth.present[row]:
+                    gap = np.inf
+            yield compliance, gap, position
+
+    def test_pairs_are_the_teeth_that_meet(self, xiamen, errors):
+        """Before the first pair, over several turns, with faults of both gears."""
+        faults = (fault("pitting"), fault("missing_tooth", "wheel", 11))
+        table, starts = xiamen.mesh_table(faults), {"pinion": 7, "wheel": 40}
+        turns = np.random.default_rng(2).uniform(-1.0, 3.0, 300)
+        roll = turns * 84 * table.pair.base_pitch
+        first = {f"start_tooth_{side}": tooth for side, tooth in starts.items()}
+
+        states = pair_states(table, roll, **first, **errors)
+
+        expected = np.array([list(self.plain(table, r, starts, errors)) for r in roll])
+        rows = (expected[:, :, 0], 1e-9, 0.0), (expected[:, :, 1], 1e-9, 1e-15)
+        for result, (values, rtol, atol) in zip(
+            (states.compliance, states.gap), rows, strict=True
+        ):
+            assert_close(result, values, rtol, atol=atol)
+        assert_close(states.position, expected[:, :, 2], atol=1e-12)
+        assert np.isinf(states.gap).any()
+
+    def test_a_value_for_every_tooth(self, table):
+        roll = np.zeros(1)
+        for n_teeth in (22, 24):
+            with pytest.raises(ValueError, match="broadcast"):
+                pair_states(table, roll, pinion_error=np.zeros(n_teeth))
+
+    def test_a_roll_that_is_no_number_reads_nothing(self, table):
+        with np.errstate(invalid="ignore"):
+            states = pair_states(table, np.array([np.nan]))
+        assert np.isnan(states.gap).all()
+        assert np.isnan(states.compliance).all()
+
+
+def test_without_a_pair_nothing_is_carried(table):
+    states = random_states(table)
+    states.gap[::3] = np.inf
+    static = static_mesh(table, states, 925.0)
+    lost = np.isinf(states.gap).all(axis=1)
+    assert lost.any()
+    assert not lost.all()
+    assert (static.approach[lost] == np.inf).all()
+    assert not static.load[lost].any()
+    assert not static.stiffness[lost].any()
+    assert np.isfinite(static.approach[~lost]).all()
+    assert (static.stiffness[~lost] > 0.0).all()
+
+
 @pytest.mark.parametrize("force", [1.0, 925.0, 2e4])
 def test_random_pairs_are_in_equilibrium(table, force):
     states = random_states(table)
