@@ -23,6 +23,7 @@ from gensig.mesh.sliced.sliced_table import SlicedTable
 Array = NDArray[np.float64]
 
 CELLS_PER_SECOND = 1000.0  # speed and torque are linear in each cell
+MOST_PAIRS = 2  # for each distinct tooth; with more, spur teeth are stored one by one
 
 
 MachineT = TypeVar("MachineT")
@@ -58,6 +59,8 @@ def pack(
     step: float,
     precision: str = "float64",
     span: tuple[float, float] = (0.0, 0.0),
+    *,
+    end: Sequence[float] | Array = (),
 ) -> Group:
     """Gear pairs of one mesh law as one group.
 
@@ -65,6 +68,7 @@ def pack(
     ----------
     step : s    of integration, over which the paper's law switches a pair
     span : s    begin and end of the required course of speed and torque, where they change
+    end : values after the last lane's in ``Group.table``
     """
     lanes = fill_lanes(dynamics, precision)
     teeth = [tooth_rows(machine.table) for machine in lanes]
@@ -83,10 +87,11 @@ def pack(
     depth = chord_depths(lanes)
     bend = np.outer(0.5 / exact[:, layout.NODES_PER_METER], [1.0, 0.0, 1.0, 0.0])
 
-    def joined(values: Callable[[ToothRows], Array]) -> NDArray[np.floating]:
-        return np.concatenate([values(rows).ravel() for rows in teeth]).astype(
-            precision
-        )
+    def joined(
+        values: Callable[[ToothRows], Array], *more: Sequence[float] | Array
+    ) -> NDArray[np.floating]:
+        of_lanes = [values(rows).ravel() for rows in teeth]
+        return np.concatenate([*of_lanes, *more], dtype=np.dtype(precision))
 
     def of_teeth(key: str) -> Array:
         return np.concatenate(
@@ -120,7 +125,7 @@ def pack(
         indices=indices.T.ravel(),
         n_pairs=int(indices[:, layout.FOLLOWED].max()),
         n_chords=depth.shape[1],
-        table=joined(lambda rows: rows.values[..., :COLUMNS]),
+        table=joined(lambda rows: rows.values[..., :COLUMNS], end),
         depth=depth.astype(precision).ravel(),
         chord_table=joined(lambda rows: rows.values[..., COLUMNS:]),
         bend=bend.astype(precision).ravel(),
@@ -325,19 +330,14 @@ def tooth_rows(table: PairTable | SlicedTable) -> ToothRows:
         kinds = table.pinion_kind, table.wheel_kind
         present = table.pinion_present[kinds[0]], table.wheel_present[kinds[1]]
     else:
-        sides = table.pinion, table.wheel
         kinds = table.pinion.kind, table.wheel.kind
         present = table.pinion.present[kinds[0]], table.wheel.present[kinds[1]]
-        if _are_many(table):
-            values = np.concatenate([_columns(side) for side in sides])
-            return ToothRows(
-                values=values[:, None],
-                row=np.where(np.concatenate(present), np.concatenate(kinds), -1),
-                pinion_stride=1,
-                wheel_first=len(table.pinion.compliance),
-            )
     pinion_kinds, pinion_row = np.unique(kinds[0], return_inverse=True)
     wheel_kinds, wheel_row = np.unique(kinds[1], return_inverse=True)
+    n_kinds = len(pinion_kinds), len(wheel_kinds)
+    are_many = math.prod(n_kinds) > MOST_PAIRS * sum(n_kinds)
+    if isinstance(table, PairTable) and are_many:
+        return _teeth_one_by_one(table, np.concatenate(present))
     pinion = np.repeat(pinion_kinds, len(wheel_kinds))
     wheel = np.tile(wheel_kinds, len(pinion_kinds))
     if pinion[0] != 0 or wheel[0] != 0:  # back flanks are those of healthy teeth
@@ -347,28 +347,36 @@ def tooth_rows(table: PairTable | SlicedTable) -> ToothRows:
         columns = _sliced_columns(table)
         values = np.stack([column[pinion, wheel] for column in columns], axis=-1)
     else:
-        values = _columns(table.pinion)[pinion] + _columns(table.wheel)[wheel]
-        values = values[:, None]
-    row = np.concatenate([pinion_row, wheel_row])
+        sides = zip(_columns(table.pinion), _columns(table.wheel), strict=True)
+        values = np.empty((len(pinion), 1, len(table.position), COLUMNS))
+        for column, (of_pinion, of_wheel) in enumerate(sides):
+            for row, (p, w) in enumerate(zip(pinion, wheel, strict=True)):
+                np.add(of_pinion[p], of_wheel[w], out=values[row, 0, :, column])
+    rows = np.concatenate([pinion_row, wheel_row])
     return ToothRows(
         values=values,
-        row=np.where(np.concatenate(present), row, -1),
+        row=np.where(np.concatenate(present), rows, -1),
         pinion_stride=len(wheel_kinds),
         wheel_first=0,
     )
 
 
-def _are_many(table: PairTable) -> bool:
-    """True if all pairs of distinct teeth would take much more memory than the teeth."""
-    n_pinion = len(np.unique(table.pinion.kind))
-    n_wheel = len(np.unique(table.wheel.kind))
-    return n_pinion * n_wheel > 2 * (n_pinion + n_wheel)
+def _teeth_one_by_one(table: PairTable, present: NDArray[np.bool_]) -> ToothRows:
+    """Rows of the distinct teeth of both gears; ``present`` (tooth,)."""
+    sides = table.pinion, table.wheel
+    values = np.concatenate([np.stack(_columns(side), axis=-1) for side in sides])
+    kinds = np.concatenate([side.kind for side in sides])
+    return ToothRows(
+        values=values[:, None],
+        row=np.where(present, kinds, -1),
+        pinion_stride=1,
+        wheel_first=len(table.pinion.compliance),
+    )
 
 
-def _columns(side: GearTable) -> Array:
-    """Table columns [c, c', g, g'], (distinct, node, 4)."""
-    columns = side.compliance, side.compliance_slope, side.gap, side.gap_slope
-    return np.stack(columns, axis=-1)
+def _columns(side: GearTable) -> tuple[Array, ...]:
+    """Table columns c, c', g, g', (distinct, node) each."""
+    return side.compliance, side.compliance_slope, side.gap, side.gap_slope
 
 
 def _sliced_columns(table: SlicedTable) -> list[Array]:

@@ -8,7 +8,7 @@ from fault_cases import one
 from lane_tools import laws
 
 from gensig.dynamics import lanes
-from gensig.dynamics._vector import LANES
+from gensig.dynamics._vector import LANES, n_lanes
 from gensig.dynamics.lanes import pack
 from gensig.faults.broken import MissingTooth
 
@@ -57,8 +57,8 @@ def motions(dynamics):
 def both_layouts(make, monkeypatch):
     """Results with the teeth summed by pair, and one by one."""
     results = []
-    for many in (False, True):
-        monkeypatch.setattr(lanes, "_are_many", lambda table, many=many: many)
+    for most_pairs in (np.inf, 0):
+        monkeypatch.setattr(lanes, "MOST_PAIRS", most_pairs)
         results.append(make())
     return results
 
@@ -68,6 +68,33 @@ def test_many_products_are_stored_tooth_by_tooth(xiamen, dynamics_of, dynamics):
     few = dynamics_of(xiamen, PITS[:5])
     assert len(pack([few], 1e-6).table) == per_row * 6
     assert len(pack([dynamics], 1e-6).table) == per_row * (N_PINION + N_WHEEL)
+
+
+@pytest.mark.parametrize("precision", ["float64", "float32"])
+def test_every_pair_of_teeth_has_the_sum_of_its_tables(
+    dynamics, precision, monkeypatch
+):
+    """Compliance, gap and slopes at every node; what a core adds stands after the last lane's."""
+    monkeypatch.setattr(lanes, "MOST_PAIRS", np.inf)
+    table, end = dynamics.table, np.array([1.0, 2.0, 3.0])
+    packed = pack([dynamics], 1e-6, precision, end=end).table
+    teeth = lanes.tooth_rows(table)
+    values = packed[:-3].reshape(n_lanes(precision), -1, table.position.size, 4)
+    sound = np.arange(84) != 20
+    for column, name in enumerate(
+        ("compliance", "compliance_slope", "gap", "gap_slope")
+    ):
+        pinion, wheel = (
+            getattr(side, name)[side.kind] for side in (table.pinion, table.wheel)
+        )
+        for lane in (0, -1):
+            result = values[lane, :, :, column]
+            for tooth in (0, 4, 22):
+                row = teeth.pinion_stride * teeth.row[tooth] + teeth.row[23:][sound]
+                expected = pinion[tooth] + wheel[sound]
+                np.testing.assert_array_equal(result[row], expected.astype(precision))
+    assert teeth.row[23 + 20] == -1
+    np.testing.assert_array_equal(packed[-3:], end)
 
 
 def test_both_layouts_give_one_law_and_motion(dynamics, motions, monkeypatch):

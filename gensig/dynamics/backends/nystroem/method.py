@@ -47,9 +47,8 @@ def pack_pairs(
     span: tuple[float, float],
 ) -> NystroemGroup:
     """Gear pairs as one group; its table ends with a missing pair and a cell of zeros."""
-    group = pack(dynamics, step, precision, span)
-    table = np.concatenate([group.table, missing_cells().astype(precision)])
-    return NystroemGroup(**aligned_fields(group._replace(table=table)))
+    group = pack(dynamics, step, precision, span, end=missing_cells())
+    return NystroemGroup(**aligned_fields(group))
 
 
 def pack_any_law(
