@@ -54,7 +54,9 @@ def eigenvalues(
     n, mesh = len(system.mass), np.outer(direction, direction)
     k = (system.stiffness + mesh_stiffness * mesh) / system.mass[:, None]
     c = system.damping / system.mass[:, None]
-    state = np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]])
+    state = np.zeros((2 * n, 2 * n))
+    state[:n, n:] = np.eye(n)
+    state[n:, :n], state[n:, n:] = -k, -c
     return np.linalg.eigvals(state).astype(np.complex128)
 
 
