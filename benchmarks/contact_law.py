@@ -156,7 +156,7 @@ def change_with_load(
     for (_, number), tooth in faulty_teeth(system.pair, this.faults).items():
         if not tooth.present:
             continue
-        gaps = slice_gaps(tooth, side.flank_curvature, side.relative_radius)
+        gaps = slice_gaps(tooth, side.contacts)
         gaps -= gaps.min(axis=0)
         secant = side.contact(tooth, np.zeros_like(table.position), system.mesh)[1]
         bearing = tooth.slice_width @ (gaps < own * secant)

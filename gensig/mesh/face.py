@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import FaultError
+from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth
 from gensig.mesh._kernels import lower_envelope, share_over_slices
 from gensig.mesh.local_contact import ContactLaw
@@ -24,23 +26,50 @@ def is_nominal(tooth: Tooth) -> bool:
     return not (tooth.material_loss.any() or tooth.flank_deviation.any())
 
 
-def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) -> Array:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FlankContacts:
+    """Nominal contacts of a flank, each position once.
+
+    Parameters
+    ----------
+    center : (contact,) m    along the involute; may lie beyond the tip, whose corner then touches
+    relative_radius : (contact,) m    of both flanks there
+    of_phase : (phase,)    index of the contact
+    content : bytes of ``center`` and ``relative_radius``
+    """
+
+    center: Array
+    relative_radius: Array
+    of_phase: NDArray[np.int64]
+    content: tuple[bytes, bytes]
+
+
+def flank_contacts(
+    gear: Gear, curvature_radius: Array, relative_radius: Array
+) -> FlankContacts:
+    """Contacts of a gear's flank at curvature radii, (phase,) m; most phases are held at A or E."""
+    different, first, of_phase = np.unique(
+        curvature_radius, return_index=True, return_inverse=True
+    )
+    center, radius = different**2 / (2.0 * gear.base_radius), relative_radius[first]
+    for values in (center, radius):
+        values.flags.writeable = False
+    return FlankContacts(
+        center=center,
+        relative_radius=radius,
+        of_phase=of_phase,
+        content=(center.tobytes(), radius.tobytes()),
+    )
+
+
+def slice_gaps(tooth: Tooth, contacts: FlankContacts) -> Array:
     """Gap of each slice beyond that of a healthy flank, (slice, phase) m.
 
     The mate rides on the edges of a hole: the gap is the lower envelope of both flanks along the
     common tangent, not the removed depth. The new corner of a flank without its tip touches.
-
-    Parameters
-    ----------
-    curvature_radius : (phase,) m    of the nominal contact; beyond the tip: its corner touches
-    relative_radius : (phase,) m     of both flanks there
     """
-    base = tooth.gear.base_radius
-    arc = tooth.profile.curvature_radius**2 / (2.0 * base)
-    different, first, inverse = np.unique(
-        curvature_radius, return_index=True, return_inverse=True
-    )
-    center, relative_radius = different**2 / (2.0 * base), relative_radius[first]
+    center = contacts.center
+    arc = tooth.profile.curvature_radius**2 / (2.0 * tooth.gear.base_radius)
     standing_back = tooth.material_loss + tooth.flank_deviation
     level = standing_back[:, :1]
     even = np.all(standing_back == level, axis=1)
@@ -49,20 +78,20 @@ def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) ->
         shapes, which, moved = _shapes(standing_back[~even])
         # the end of a nominal flank touches
         beyond = np.maximum(np.maximum(center - arc[-1], arc[0] - center), 0.0)
-        nodes = arc.tobytes(), center.tobytes(), relative_radius.tobytes()
+        nodes = arc.tobytes(), *contacts.content
         touched = np.stack([_envelope(shape.tobytes(), *nodes) for shape in shapes])
-        uneven = touched - beyond**2 / (2.0 * relative_radius)
+        uneven = touched - beyond**2 / (2.0 * contacts.relative_radius)
         gap[~even] = uneven[which] + moved
-    return gap[:, inverse]
+    return gap[:, contacts.of_phase]
 
 
 # a record needs the flanks of its unit again, at other loads; 128 rows of 512 nodes a pitch, with
-# what they are known by, take 6 MB
+# what they are known by, take 6 MB at most
 @lru_cache(maxsize=128)
 def _envelope(
     standing_back: bytes, arc: bytes, center: bytes, relative_radius: bytes
 ) -> Array:
-    """Lower envelope of one slice, (node,) m, read-only.
+    """Lower envelope of one slice, (contact,) m, read-only.
 
     The arguments are the bytes of those of ``lower_envelope``: kept by content.
     """
@@ -83,19 +112,19 @@ def _shapes(standing_back: Array) -> tuple[Array, NDArray[np.int64], Array]:
     """
     moved = np.where(np.isfinite(standing_back[:, :1]), standing_back[:, :1], 0.0)
     known: dict[bytes, int] = {}
-    which = [
-        known.setdefault(row.tobytes(), len(known))
-        for row in np.round(standing_back - moved, SHAPE_DECIMALS)
-    ]
+    first: list[int] = []
+    which: list[int] = []
+    for number, row in enumerate(np.round(standing_back - moved, SHAPE_DECIMALS)):
+        which.append(known.setdefault(row.tobytes(), len(known)))
+        if len(known) > len(first):
+            first.append(number)
     shape_of_row = np.array(which, dtype=np.int64)
-    first = np.unique(shape_of_row, return_index=True)[1]
     return standing_back[first] - moved[first], shape_of_row, moved
 
 
 def face_contact(
     tooth: Tooth,
-    curvature_radius: Array,
-    relative_radius: Array,
+    contacts: FlankContacts,
     law: ContactLaw,
     load: Array,
     bending: Array,
@@ -106,11 +135,10 @@ def face_contact(
 
     Parameters
     ----------
-    curvature_radius, relative_radius : see ``slice_gaps``
     load : (phase,) N    at which the secant is taken
     bending : (phase,) m/N    of both teeth over the whole face, if slices bend alone; else 0
     """
-    gaps = slice_gaps(tooth, curvature_radius, relative_radius)
+    gaps = slice_gaps(tooth, contacts)
     if len(gaps) == 1 and np.isfinite(gaps).all():  # bears as a healthy flank
         return gaps[0], law.compliance(tooth.gear.face_width, load)
     gap, compliance = np.empty_like(load), np.empty_like(load)

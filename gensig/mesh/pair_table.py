@@ -18,7 +18,13 @@ from gensig.material import Material
 from gensig.mesh.body import body_compliance, check_rim
 from gensig.mesh.body_coupling import shared_body_compliance
 from gensig.mesh.compliance import tooth_compliance
-from gensig.mesh.face import bearing_width, face_contact, is_nominal
+from gensig.mesh.face import (
+    FlankContacts,
+    bearing_width,
+    face_contact,
+    flank_contacts,
+    is_nominal,
+)
 from gensig.mesh.local_contact import ContactLaw, contact_law, relative_radius
 from gensig.mesh.modification import PLAIN, PairModification, sound_teeth
 from gensig.mesh.options import MeshOptions
@@ -278,14 +284,13 @@ def slice_bending(
 class FlankSide:
     """One gear's flank at contact positions.
 
-    ``flank_curvature`` goes on beyond its tip, ``curvature`` is held at A and E. ``base`` is the
-    ``share`` of a healthy pair's contact compliance that is counted on the mate's side.
+    ``contacts`` go on beyond its tip, ``curvature`` is held at A and E. ``base`` is the ``share``
+    of a healthy pair's contact compliance that is counted on the mate's side.
     """
 
     gear: Gear
     curvature: Array
-    flank_curvature: Array
-    relative_radius: Array
+    contacts: FlankContacts
     law: ContactLaw
     share: float
     load: Array
@@ -308,9 +313,8 @@ class FlankSide:
         width: Array | float = self.gear.face_width
         if tooth.present and not is_nominal(tooth):
             if options.law != "paper":
-                flank = self.flank_curvature, self.relative_radius
                 gap, compliance = face_contact(
-                    tooth, *flank, self.law, self.load, bending
+                    tooth, self.contacts, self.law, self.load, bending
                 )
                 return gap, compliance - self.base
             width = bearing_width(tooth, self.curvature)
@@ -335,12 +339,14 @@ def flank_sides(
     on_path = np.clip(position, 0.0, path)
     beyond_tip = np.maximum(position, 0.0), np.minimum(position, path)
     shares = 1.0 - pinion_share, pinion_share
+    radius = relative_radius(pair, on_path)
     return {
         side: FlankSide(
             gear=pair.gears[side],
             curvature=pair.curvature(side, on_path),
-            flank_curvature=pair.curvature(side, reach),
-            relative_radius=relative_radius(pair, on_path),
+            contacts=flank_contacts(
+                pair.gears[side], pair.curvature(side, reach), radius
+            ),
             law=contact_law(pair, on_path, material, options),
             share=share,
             load=np.empty(0),

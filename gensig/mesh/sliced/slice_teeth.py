@@ -142,7 +142,7 @@ def _gap(tooth: Tooth, flank: FlankSide, pair: GearPair, edges: Array) -> Array:
     """Gap of the flank, (slice, node) m."""
     if is_nominal(tooth):
         return np.zeros((len(edges) - 1, len(flank.curvature)))
-    gaps = slice_gaps(tooth, flank.flank_curvature, flank.relative_radius)
+    gaps = slice_gaps(tooth, flank.contacts)
     return np.where(np.isfinite(gaps), gaps, NO_FLANK)[_source(tooth, pair, edges)]
 
 

@@ -16,7 +16,7 @@ from gensig.geometry.contact import corner_gap_by_pinion
 from gensig.geometry.tooth import healthy_tooth
 from gensig.mesh import face
 from gensig.mesh._kernels import lower_envelope, share_over_slices
-from gensig.mesh.face import bearing_width, is_nominal, slice_gaps
+from gensig.mesh.face import bearing_width, flank_contacts, is_nominal, slice_gaps
 from gensig.mesh.local_contact import ContactLaw, linear_contact, weber_contact
 
 UM = 1e-6
@@ -29,6 +29,12 @@ def gap_rows(system, *faults):
     table = system.mesh_table(faults)
     side = side_of(table, faults[0].gear)
     return side.gap[side.kind[0]] - side.gap[0], table
+
+
+def gaps_at(tooth, curvature, radius=5e-3):
+    """Gaps (slice, phase) of a tooth at curvature radii of contact, for a mate's flank."""
+    radius = np.zeros_like(curvature) + radius
+    return slice_gaps(tooth, flank_contacts(tooth.gear, curvature, radius))
 
 
 class TestLowerEnvelope:
@@ -195,13 +201,13 @@ class TestRigidFlanks:
 
         tip = tooth.profile.curvature_radius[-1]
         at = np.linspace(0.5 * tip, 1.2 * tip, 50)
-        assert_close(slice_gaps(tooth, at, np.full(50, 5e-3)), 0.0)
+        assert_close(gaps_at(tooth, at), 0.0)
 
     def test_a_gap_everywhere_is_that_gap_beyond_the_tip_too(self, xiamen):
         tooth = healthy_tooth(xiamen.pair.pinion).with_deviation(np.array([-7 * UM]))
         assert not is_nominal(tooth)
         at = tooth.profile.curvature_radius[-1] * np.linspace(0.5, 1.2, 50)
-        gaps = slice_gaps(tooth, at, np.full(50, 5e-3))
+        gaps = gaps_at(tooth, at)
         assert_close(gaps, -7 * UM, 1e-12)
 
 
@@ -230,13 +236,13 @@ class TestKeptEnvelopes:
     def anew(tooth, at, radius):
         """Gaps with an empty store."""
         face._envelope.cache_clear()
-        return slice_gaps(tooth, at, radius)
+        return gaps_at(tooth, at, radius)
 
     def test_kept_and_computed_anew_are_equal_bits(self, teeth, at):
         radius = np.full(len(at), 5e-3)
         computed = self.anew(teeth(1), at, radius)
         n_computed = face._envelope.cache_info().misses
-        np.testing.assert_array_equal(slice_gaps(teeth(1), at, radius), computed)
+        np.testing.assert_array_equal(gaps_at(teeth(1), at, radius), computed)
         assert face._envelope.cache_info().misses == n_computed == 2
 
     @pytest.mark.parametrize("changed", ["deviation", "curvature", "radius", "outline"])
@@ -261,7 +267,7 @@ class TestKeptEnvelopes:
         node = half + np.argmin(tooth.flank_deviation[1, half:])
         place = {"deviation": node, "outline": node}.get(changed, len(at) // 2)
         inputs[changed][place] *= 1.001
-        served = slice_gaps(tooth, at, radius)
+        served = gaps_at(tooth, at, radius)
         np.testing.assert_array_equal(served, self.anew(tooth, at, radius))
         assert (served != before).any()
 
@@ -270,7 +276,17 @@ class TestKeptEnvelopes:
         first = self.anew(teeth(1), at, radius)
         expected = first.copy()
         first[:] = 0.0
-        np.testing.assert_array_equal(slice_gaps(teeth(1), at, radius), expected)
+        np.testing.assert_array_equal(gaps_at(teeth(1), at, radius), expected)
+
+    def test_contacts_keep_the_content_that_they_are_known_by(self, xiamen, at):
+        radius = np.full(len(at), 5e-3)
+        contacts = flank_contacts(xiamen.pair.pinion, at, radius)
+        for values in (contacts.center, contacts.relative_radius):
+            with pytest.raises(ValueError, match="read-only"):
+                values[0] = 0.0
+        at[0], radius[0] = at[1], 6e-3
+        kept = [np.frombuffer(values) for values in contacts.content]
+        np.testing.assert_array_equal(kept, [contacts.center, contacts.relative_radius])
 
     def test_threads_share_a_bounded_store(self, teeth, at):
         most = face._envelope.cache_info().maxsize
@@ -278,7 +294,7 @@ class TestKeptEnvelopes:
         expected = [self.anew(teeth(seed), at, radius) for seed in seeds]
         face._envelope.cache_clear()
         with ThreadPoolExecutor(4) as pool:
-            gaps = pool.map(lambda seed: slice_gaps(teeth(seed), at, radius), seeds)
+            gaps = pool.map(lambda seed: gaps_at(teeth(seed), at, radius), seeds)
         np.testing.assert_array_equal(list(gaps), expected)
         assert face._envelope.cache_info().currsize == most
 
