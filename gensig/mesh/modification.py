@@ -8,7 +8,7 @@ section on flank modifications.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import Any
 
@@ -134,6 +134,12 @@ class FlankModification:
         return depth
 
 
+# all that is 0 for the involute helicoid
+SIZES = tuple(
+    field.name for field in fields(FlankModification) if field.name != "profile_shape"
+)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairModification:
     """Both gears' modifications, and misalignment of the shafts, m over the face.
@@ -155,10 +161,10 @@ class PairModification:
     @property
     def is_any(self) -> bool:
         """True unless both flanks are aligned involute helicoids."""
-        plain = FlankModification()
         is_cut = any(
-            replace(side, profile_shape=plain.profile_shape) != plain
-            for side in self.sides.values()
+            getattr(side, name) != 0.0
+            for side in (self.pinion, self.wheel)
+            for name in SIZES
         )
         return is_cut or self.misalignment != 0.0 or self.growth is not None
 

@@ -284,8 +284,8 @@ def slice_bending(
 class FlankSide:
     """One gear's flank at contact positions.
 
-    ``contacts`` go on beyond its tip, ``curvature`` is held at A and E. ``base`` is the ``share``
-    of a healthy pair's contact compliance that is counted on the mate's side.
+    ``contacts`` go on beyond its tip, ``curvature`` is held at A and E. ``sound`` is the contact
+    compliance of healthy flanks, ``base`` the ``share`` of it that is counted on the mate's side.
     """
 
     gear: Gear
@@ -294,6 +294,7 @@ class FlankSide:
     law: ContactLaw
     share: float
     load: Array
+    sound: Array
     base: Array
 
     def with_load(self, load: Array | float) -> FlankSide:
@@ -301,7 +302,7 @@ class FlankSide:
         loads = np.empty_like(self.curvature)
         loads[:] = load
         sound = self.law.compliance(self.gear.face_width, loads)
-        return replace(self, load=loads, base=self.share * sound)
+        return replace(self, load=loads, sound=sound, base=self.share * sound)
 
     def contact(
         self, tooth: Tooth, bending: Array, options: MeshOptions
@@ -310,16 +311,16 @@ class FlankSide:
 
         ``bending`` (phase,) m/N as from ``slice_bending``.
         """
-        width: Array | float = self.gear.face_width
+        gap, compliance = np.zeros_like(self.load), self.sound
         if tooth.present and not is_nominal(tooth):
-            if options.law != "paper":
+            if options.law == "paper":
+                width = bearing_width(tooth, self.curvature)
+                compliance = self.law.compliance(width, self.load)
+            else:
                 gap, compliance = face_contact(
                     tooth, self.contacts, self.law, self.load, bending
                 )
-                return gap, compliance - self.base
-            width = bearing_width(tooth, self.curvature)
-        compliance = self.law.compliance(width, self.load)
-        return np.zeros_like(self.load), compliance - self.base
+        return gap, compliance - self.base
 
 
 def flank_sides(
@@ -350,6 +351,7 @@ def flank_sides(
             law=contact_law(pair, on_path, material, options),
             share=share,
             load=np.empty(0),
+            sound=np.empty(0),
             base=np.empty(0),
         ).with_load(load)
         for side, reach, share in zip(SIDES, beyond_tip, shares, strict=True)

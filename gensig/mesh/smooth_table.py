@@ -21,10 +21,13 @@ def smooth(values: Array, distance: float, limit: float) -> tuple[Array, Array]:
     ----------
     values : (row, node)    at a constant ``distance`` in m
     """
-    bend = np.zeros(values.shape[1])
-    bend[1:-1] = np.clip(np.diff(values[0], n=2), -limit, limit)
-    here = values - 0.25 * bend
+    first = np.diff(values[0])
+    bend = np.minimum(np.maximum(first[1:] - first[:-1], -limit), limit)
+    points = np.empty((len(values), values.shape[1] + 2))  # one more at each end
+    points[:, 1:-1] = values
+    points[:, 2:-2] -= 0.25 * bend
     # linear beyond the ends; np.pad takes longer than all the rest
-    before = np.concatenate([2.0 * here[:, :1] - here[:, 1:2], here[:, :-1]], axis=1)
-    after = np.concatenate([here[:, 1:], 2.0 * here[:, -1:] - here[:, -2:-1]], axis=1)
+    points[:, 0] = 2.0 * points[:, 1] - points[:, 2]
+    points[:, -1] = 2.0 * points[:, -2] - points[:, -3]
+    before, here, after = points[:, :-2], points[:, 1:-1], points[:, 2:]
     return 0.25 * (before + 2.0 * here + after), (after - before) / (2.0 * distance)

@@ -130,8 +130,22 @@ def test_two_slopes_of_opposite_sign_leave_an_aligned_pair(pair):
 def test_nothing_is_nothing(pair):
     assert not of_pair().is_any
     assert not of_pair(pinion=FlankModification(profile_shape="parabolic")).is_any
-    assert of_pair(wheel=FlankModification(crowning=1e-9)).is_any
     assert (at(pair, of_pair())[2] == 0.0).all()
+
+
+@pytest.mark.parametrize("side", ["pinion", "wheel"])
+@pytest.mark.parametrize(
+    "size",  # reliefs have one of these lengths
+    [
+        "tip_relief_height",
+        "root_relief_height",
+        "crowning",
+        "end_relief_width",
+        "helix_slope",
+    ],
+)
+def test_any_size_of_either_gear_is_a_modification(side, size):
+    assert of_pair(**{side: FlankModification(**{size: 1e-9})}).is_any
 
 
 @pytest.mark.parametrize(
