@@ -61,7 +61,6 @@ def share_over_pairs(compliance, gap, force, shared, approach, load, stiffness):
     approach, load, stiffness : (phase,) m, (phase, pair) N, (phase,) N/m, written
     """
     n_pairs = gap.shape[1]
-    local, total = np.empty(n_pairs), np.empty(n_pairs)
     order = np.empty(n_pairs, np.int64)
     for i in range(gap.shape[0]):
         for j in range(n_pairs):
@@ -70,20 +69,20 @@ def share_over_pairs(compliance, gap, force, shared, approach, load, stiffness):
                 order[position] = order[position - 1]
                 position -= 1
             order[position] = j
-        stiff, moment, carried = 0.0, 0.0, 0
+        # if the pairs so far carry: stiffness, its moment, approach less the shared deflection
+        stiff, moment, local = 0.0, 0.0, 0.0
+        own, carrying = -np.inf, 0.0
         for position in range(n_pairs):
             j = order[position]
             if gap[i, j] < np.inf:
                 stiff += 1.0 / compliance[i, j]
                 moment += gap[i, j] / compliance[i, j]
-            # approach less the shared deflection if the pairs so far carry
-            total[position], local[position] = stiff, (force + moment) / stiff
-            if local[position] > gap[i, j]:
-                carried += 1
-        own, stiff = -np.inf, 0.0
-        if carried > 0:
-            own, stiff = local[carried - 1], total[carried - 1]
+                local = (force + moment) / stiff
+                if local > gap[i, j]:
+                    own, carrying = local, stiff
         for j in range(n_pairs):
             load[i, j] = max(own - gap[i, j], 0.0) / compliance[i, j]
-        approach[i] = own + shared * force if carried > 0 else np.inf
-        stiffness[i] = stiff / (1.0 + shared * stiff)
+        approach[i] = np.inf
+        if carrying > 0.0:
+            approach[i] = own + shared * force
+        stiffness[i] = carrying / (1.0 + shared * carrying)
