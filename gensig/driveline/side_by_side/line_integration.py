@@ -16,7 +16,7 @@ from gensig.driveline.side_by_side.line_lanes import pack_lines
 from gensig.dynamics.backends.base import Integration, Motions
 from gensig.dynamics.backends.group_motions import integrate_machines
 from gensig.dynamics.backends.group_run import Core
-from gensig.dynamics.backends.nystroem import _line_chord_kernels, _line_kernels
+from gensig.dynamics.backends.nystroem import _line_chord_meshes, _line_spur_meshes
 from gensig.dynamics.backends.nystroem._line_layout import line_scratch
 from gensig.dynamics.backends.nystroem.stability import stable_rate
 from gensig.dynamics.backends.step_limits import COARSE_STABILITY
@@ -26,12 +26,12 @@ Array = NDArray[np.float64]
 
 def line_core(line: LineDynamics) -> Core[LineDynamics]:
     """The core for lines of the bodies and meshes of one."""
-    kernels = _line_chord_kernels if line.has_chords else _line_kernels
+    meshes = _line_chord_meshes if line.has_chords else _line_spur_meshes
     n_meshes = len(line.pairs)
     return Core(
         pack=pack_lines,
         scratch=partial(_scratch, n_meshes),
-        integrate=kernels.integrate,
+        integrate=meshes.integrate,
         coarsest_oversampling=_coarsest_oversampling,
         settling_time=lambda line: line.settling_time,
         n_meshes=n_meshes,

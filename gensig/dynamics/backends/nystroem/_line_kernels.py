@@ -1,17 +1,19 @@
 """Two-evaluation core for machines of several meshes: loops over meshes and degrees of freedom.
 
-The law of a mesh, its tables and its kinks are those of the core for one pair.
+The machine is here. What a mesh reads, how it pushes and what its kinks miss are functions that
+``line_integrator`` takes: of ``_line_spur_meshes`` and of ``_line_chord_meshes``.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._record_kernels import integrates
+from gensig.dynamics._layout import EVEN, ODD
 from gensig.dynamics._vector import (
     EIGHT,
-    any_above,
     at,
     compiled,
     get_row,
@@ -27,34 +29,20 @@ from gensig.dynamics._vector import (
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem import _line_layout as lines
 from gensig.dynamics.backends.nystroem._flat import number_at
-from gensig.dynamics.backends.nystroem._kernels import RECENTER, choose, write_mesh
-from gensig.dynamics.backends.nystroem._kinks import (
-    kinked,
-)
-from gensig.dynamics.backends.nystroem._law import mesh_law
-from gensig.dynamics.backends.nystroem._layout import FOLLOWED
+from gensig.dynamics.backends.nystroem._kernels import RECENTER, choose
 from gensig.dynamics.backends.nystroem._line_layout import (
-    LineGroup,
     machine_rows,
     mesh_of,
     mesh_rows,
     of,
-    wide_rows,
 )
 from gensig.dynamics.backends.nystroem._line_meshes import (
     acceleration,
-    correct,
     couple,
     govern,
-    law_at,
     mesh_mobility,
-    motion,
     own_pull,
-    push,
-    ratio,
-    rolled,
     touched,
-    turning_speed,
 )
 from gensig.dynamics.backends.nystroem._motion import (
     DAMPER_SHARE,
@@ -62,95 +50,139 @@ from gensig.dynamics.backends.nystroem._motion import (
     predict,
     to_middle,
 )
-from gensig.dynamics.backends.nystroem._pairs import (
-    first_pairs,
-    locate,
-    read_begin,
-    read_step,
-    take_pairs,
-)
 
 
-@compiled
-def integrate(
-    group,
-    state,
-    lost,
-    fresh,
-    step,
-    first_step,
-    n_steps,
-    channels,
-    out,
-    out_row,
-    angle,
-    angle_row,
-    per_angle,
-    seen,
-    work,
-    wide,
-    near,
-):
-    """Advance every lane by ``n_steps``; parameters are those of ``_record_kernels.integrate``.
+def line_integrator(
+    *,
+    begin_mesh: Any,
+    start_mesh: Any,
+    write_mesh: Any,
+    read_mesh: Any,
+    push_middle: Any,
+    push_end: Any,
+    end_mesh: Any,
+    keep_mesh: Any,
+) -> Any:
+    """The core of lines whose meshes have one law.
 
-    ``lost`` has one row for every mesh. ``angle`` takes as many rows a sample as the group has
-    angles, ``seen`` the rows of every mesh.
+    Each function is one of compiled code, for one mesh: at the begin of a call, at the start of
+    its fresh lanes, for the output, at the begin of a step, in its middle, at its end, after it,
+    and at the end of a call.
     """
-    n = width(work)
-    n_dof, n_meshes = len(group.force) // n, group.n_meshes
-    n_channels = len(channels) if out_row >= 0 else 0
-    machine = machine_rows(work, n_meshes, n)
-    begin(group, step, state, work)
-    starting, by_tooth = is_any_fresh(fresh, n), False
+
+    @compiled
+    def start(group, slot, fresh, by_tooth, work, wide, near):
+        """Set what the step remembers in the lanes that are fresh, from one evaluation there."""
+        n = width(work)
+        machine = machine_rows(work, group.n_meshes, n)
+        pull_at_begin(group, machine)
+        for m in range(group.n_meshes):
+            start_mesh(group, m, slot, fresh, by_tooth, machine, work, wide, near)
+        for lane in range(n):
+            machine[at(rows.FRESH, lane, n)] = fresh[lane]
+        accelerate_fresh(group, get_row(machine, rows.FRESH), machine)
+
+    @compiled
+    def integrate(
+        group,
+        state,
+        lost,
+        fresh,
+        step,
+        first_step,
+        n_steps,
+        channels,
+        out,
+        out_row,
+        angle,
+        angle_row,
+        per_angle,
+        seen,
+        work,
+        wide,
+        near,
+    ):
+        """Advance every lane by ``n_steps``; parameters are those of ``_record_kernels.integrate``.
+
+        ``lost`` has one row for every mesh. ``angle`` takes as many rows a sample as the group has
+        angles, ``seen`` the rows of every mesh.
+        """
+        n = width(work)
+        n_dof, n_meshes = len(group.force) // n, group.n_meshes
+        n_channels = len(channels) if out_row >= 0 else 0
+        machine = machine_rows(work, n_meshes, n)
+        begin(group, step, state, work)
+        starting, by_tooth = is_any_fresh(fresh, n), has_teeth_apart(group, n)
+        slot, next_slot = EVEN, ODD
+        for number in range(first_step, first_step + n_steps):
+            begin_step(group, number, number == first_step, step, machine, wide)
+            if number == first_step:
+                for m in range(n_meshes):
+                    begin_mesh(group, m, slot, fresh, step, machine, work, wide, near)
+                if starting:
+                    start(group, slot, fresh, by_tooth, work, wide, near)
+            if angle_row >= 0 and number % per_angle == 0:
+                write_angles(group, angle, angle_row, machine, wide)
+                if len(seen) > 0:
+                    for m in range(n_meshes):
+                        seen_row = angle_row * n_meshes + m
+                        write_mesh(group, m, seen, seen_row, work, wide, near)
+                angle_row += 1
+            for m in range(n_meshes):
+                count_lost(lost, m, mesh_rows(work, m, n))
+                read_mesh(
+                    group, m, slot, next_slot, step, by_tooth, machine, work, wide, near
+                )
+            for d in range(n_dof):
+                moved, rate = to_middle(d * lines.N_BLOCKS, step, 1, machine)
+                own_pull(group, d, moved, rate, machine)
+            couple(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
+            govern(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
+            for m in range(n_meshes):
+                push_middle(group, m, step, machine, work, wide, near)
+            for d in range(n_dof):
+                a = acceleration(group, d, machine)
+                moved, rate = predict(d * lines.N_BLOCKS, a, step, 1, machine)
+                own_pull(group, d, moved, rate, machine)
+            couple(group, rows.END_Q, rows.END_V, machine)
+            govern(group, rows.END_Q, rows.END_V, machine)
+            for m in range(n_meshes):
+                push_end(group, m, next_slot, step, machine, work, wide, near)
+            for d in range(n_dof):
+                a = acceleration(group, d, machine)
+                conclude(d * lines.N_BLOCKS, a, step, 1, machine)
+            for m in range(n_meshes):
+                end_mesh(group, m, next_slot, step, machine, work, near)
+            out_first = (out_row + number - first_step) * n_channels
+            write_means(group, channels, n_channels, out, out_first, machine)
+            slot, next_slot = next_slot, slot
+        if slot == ODD:
+            for m in range(n_meshes):
+                keep_mesh(m, work, wide, near)
+        end(group, state, machine)
+        return angle_row
+
+    return integrate
+
+
+@inlined
+def has_teeth_apart(group, n):
+    """True if a mesh of any lane stores its teeth one by one."""
+    by_tooth = False
     for lane in range(n):
-        for m in range(n_meshes):
+        for m in range(group.n_meshes):
             wheel_rows = at(m * layout.N_INDICES + layout.WHEEL_ROWS, lane, n)
             by_tooth = by_tooth or group.indices[wheel_rows] > 0
-    for number in range(first_step, first_step + n_steps):
-        begin_step(group, number, number == first_step, step, machine, wide)
-        if starting and number == first_step:
-            start(group, fresh, by_tooth, work, wide)
-        if angle_row >= 0 and number % per_angle == 0:
-            write_angles(group, angle, angle_row, machine, wide)
-            if len(seen) > 0:
-                for m in range(n_meshes):
-                    write_mesh(
-                        mesh_of(group, m, n),
-                        seen,
-                        angle_row * n_meshes + m,
-                        mesh_rows(work, m, n),
-                        wide_rows(wide, m, n),
-                    )
-            angle_row += 1
-        for m in range(n_meshes):
-            read_mesh(group, m, step, by_tooth, lost, machine, work, wide)
-        for d in range(n_dof):
-            moved, rate = to_middle(d * lines.N_BLOCKS, step, 1, machine)
-            own_pull(group, d, moved, rate, machine)
-        couple(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
-        govern(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
-        for m in range(n_meshes):
-            push_middle(group, m, step, machine, work, wide)
-        for d in range(n_dof):
-            a = acceleration(group, d, machine)
-            moved, rate = predict(d * lines.N_BLOCKS, a, step, 1, machine)
-            own_pull(group, d, moved, rate, machine)
-        couple(group, rows.END_Q, rows.END_V, machine)
-        govern(group, rows.END_Q, rows.END_V, machine)
-        for m in range(n_meshes):
-            push_end(group, m, step, machine, work, wide)
-        for d in range(n_dof):
-            a = acceleration(group, d, machine)
-            conclude(d * lines.N_BLOCKS, a, step, 1, machine)
-        for m in range(n_meshes):
-            end_mesh(group, m, step, machine, work)
-        out_first = (out_row + number - first_step) * n_channels
-        write_means(group, channels, n_channels, out, out_first, machine)
-    end(group, state, machine)
-    return angle_row
+    return by_tooth
 
 
-integrates(integrate, LineGroup)
+@inlined
+def count_lost(lost, m, own):
+    """Count a step in which a mesh has no contact."""
+    zero, one = spread(own, 0.0), spread(own, 1.0)
+    normal = get_row(own, rows.NORMAL)
+    apart = where_above(normal * normal, zero, zero, one)
+    set_row(lost, m, get_row(lost, m) + apart)
 
 
 @inlined
@@ -301,52 +333,6 @@ def _in_row(exact, row, work):
     return joined(work, low, high)
 
 
-@compiled
-def start(group, fresh, by_tooth, work, wide):
-    """Set what the step remembers in the lanes that are fresh, from one evaluation there."""
-    n = width(work)
-    machine = machine_rows(work, group.n_meshes, n)
-    zero = spread(work, 0.0)
-    q, v = rows.Q, rows.V
-    pull_at_begin(group, machine)
-    for m in range(group.n_meshes):
-        mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
-        own_wide = wide_rows(wide, m, n)
-        first_pairs(mesh, fresh, own, own_wide)
-        for j in range(FOLLOWED):
-            read_begin(mesh, by_tooth, j, own, own_wide)
-        approach, rate = motion(group, m, q, v, machine)
-        speed = turning_speed(group, m, v, zero, machine)
-        kept = (
-            get_row(own, rows.PAIR_FORCE),
-            get_row(own, rows.PAIR_FORCE + 1),
-            get_row(own, rows.PAIR_FORCE + 2),
-        )
-        law = mesh_law(
-            mesh,
-            rows.NODES,
-            rows.END_AT,
-            0.0 - get_row(own, rows.BEHIND),
-            zero,
-            approach,
-            rate,
-            get_row(mesh.numbers, layout.PINION_RADIUS) * speed,
-            own,
-            own_wide,
-        )
-        push(group, m, law, machine)
-        flags = get_row(own, rows.FRESH)
-        choose(flags, rows.NORMAL, law.normal, own)
-        for j in range(FOLLOWED):
-            margin = get_row(own, rows.MARGIN + rows.END_AT * FOLLOWED + j)
-            choose(flags, rows.MARGIN + j, margin, own)
-        for j in range(FOLLOWED):
-            force = get_row(own, rows.PAIR_FORCE + j)
-            force = where_above(flags, zero, force, kept[j])
-            set_row(own, rows.PAIR_FORCE + j, force)
-    accelerate_fresh(group, get_row(machine, rows.FRESH), machine)
-
-
 @inlined
 def pull_at_begin(group, machine):
     """Set all forces but those of meshes from the state at the begin of a step."""
@@ -381,89 +367,3 @@ def write_angles(group, angle, row, machine, wide):
             turned = turned * load_wide(group.exact_rotation, at(d, first, n))
             turned = turned + load_wide(machine, at(own, first, n))
             store(angle, at(row * n_angles + k, first, n), turned)
-
-
-@inlined
-def read_mesh(group, m, step, by_tooth, lost, machine, work, wide):
-    """Read the tables of a mesh at the end of the step and set its nodes."""
-    n = width(work)
-    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
-    own_wide = wide_rows(wide, m, n)
-    zero, one = spread(work, 0.0), spread(work, 1.0)
-    normal = get_row(own, rows.NORMAL)
-    apart = where_above(normal * normal, zero, zero, one)
-    set_row(lost, m, get_row(lost, m) + apart)
-    if locate(mesh, own, own_wide):
-        take_pairs(mesh, by_tooth, own, own_wide)
-    # the roll at the end of the step, with every force in it
-    now, v = rows.NOW, rows.V
-    d = touched(group, m, lines.A_TURN)
-    gain = ratio(group, m, machine) * get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
-    gain = gain + get_row(machine, of(now, d))
-    speed = turning_speed(group, m, v, zero, machine) + (0.5 * step) * gain
-    radius = get_row(mesh.numbers, layout.PINION_RADIUS)
-    ahead, behind = step * radius * speed, get_row(own, rows.BEHIND)
-    span = ahead - behind
-    per_span = 1.0 / span
-    for j in range(FOLLOWED):
-        read_step(mesh, by_tooth, j, ahead, span, per_span, own, own_wide)
-    set_row(own, lines.AHEAD, ahead)
-    set_row(own, lines.BEGUN, get_row(machine, of(rows.Q, d)))
-
-
-@inlined
-def push_middle(group, m, step, machine, work, wide):
-    """Evaluate the law of a mesh in the middle of the step and add its forces."""
-    n = width(work)
-    q, v = rows.MIDDLE_Q, rows.MIDDLE_V
-    own = mesh_rows(work, m, n)
-    turned = rolled(group, m, 0.5 * step, q, machine, own)
-    ahead = get_row(own, lines.AHEAD)
-    off = turned - 0.5 * (ahead + get_row(own, rows.BEHIND))
-    since = spread(work, 0.5 * step)
-    law = law_at(
-        group,
-        m,
-        rows.MIDDLE,
-        rows.MIDDLE_AT,
-        off,
-        turned,
-        since,
-        q,
-        v,
-        machine,
-        work,
-        wide,
-    )
-    push(group, m, law, machine)
-
-
-@inlined
-def push_end(group, m, step, machine, work, wide):
-    """Evaluate the law of a mesh at the end of the step and add its forces."""
-    n = width(work)
-    q, v = rows.END_Q, rows.END_V
-    own = mesh_rows(work, m, n)
-    turned = rolled(group, m, step, q, machine, own)
-    off = turned - get_row(own, lines.AHEAD)
-    since = spread(work, step)
-    law = law_at(
-        group, m, rows.NODES, rows.END_AT, off, turned, since, q, v, machine, work, wide
-    )
-    push(group, m, law, machine)
-    set_row(own, rows.NORMAL, law.normal)
-
-
-@inlined
-def end_mesh(group, m, step, machine, work):
-    """Correct the end of the step for the kinks of a mesh, and shift what it remembers."""
-    n = width(work)
-    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
-    changed = kinked(0, own), kinked(1, own), kinked(2, own)
-    if any_above(changed[0] + changed[1] + changed[2], spread(work, 0.0)):
-        correct(group, mesh, m, step, changed, machine, own)
-    turned = rolled(group, m, step, rows.Q, machine, own)
-    set_row(own, rows.BEHIND, get_row(own, lines.AHEAD) - turned)
-    for j in range(FOLLOWED):
-        margin = get_row(own, rows.MARGIN + rows.END_AT * FOLLOWED + j)
-        set_row(own, rows.MARGIN + j, margin)

@@ -1,16 +1,16 @@
-"""Two-evaluation core for machines of several meshes, some helical or of high contact ratio.
+"""Meshes of a line of which some are helical or of high contact ratio.
 
-The machine is that of ``_line_kernels``; tables, law and kinks of its meshes are those of
-``_any_law_kernels``.
+Law, tables and kinks are those of ``_any_law_kernels``; spur teeth have one chord.
 """
 
 from __future__ import annotations
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._layout import AHEAD, BASE, EVEN, MIDDLE, ODD, PART, ROLL
+from gensig.dynamics import _slots
+from gensig.dynamics._layout import AHEAD, BASE, MIDDLE, PART, ROLL
 from gensig.dynamics._mesh_kernels import mesh_law
 from gensig.dynamics._record_kernels import integrates
-from gensig.dynamics._slots import keep_begin, near_pairs, roll_ahead, write_mesh
+from gensig.dynamics._slots import keep_begin, near_pairs, roll_ahead
 from gensig.dynamics._tables import between, chords_between, cover, gather
 from gensig.dynamics._vector import (
     any_above,
@@ -39,148 +39,28 @@ from gensig.dynamics.backends.nystroem._any_law_kinks import (
 from gensig.dynamics.backends.nystroem._chord_kinks import miss_chords, read_again
 from gensig.dynamics.backends.nystroem._kernels import choose
 from gensig.dynamics.backends.nystroem._layout import END_AT, MIDDLE_AT
-from gensig.dynamics.backends.nystroem._line_kernels import (
-    accelerate_fresh,
-    begin,
-    begin_step,
-    end,
-    is_any_fresh,
-    pull_at_begin,
-    write_angles,
-    write_means,
-)
+from gensig.dynamics.backends.nystroem._line_kernels import line_integrator
 from gensig.dynamics.backends.nystroem._line_layout import (
     ChordLineGroup,
     chord_mesh_of,
     integer_rows,
-    machine_rows,
     mesh_rows,
     of,
     wide_rows,
 )
 from gensig.dynamics.backends.nystroem._line_meshes import (
-    acceleration,
     correct_by,
-    couple,
-    govern,
     motion,
-    own_pull,
     push,
     ratio,
     rolled,
     touched,
     turning_speed,
 )
-from gensig.dynamics.backends.nystroem._motion import conclude, predict, to_middle
 
 
 @compiled
-def integrate(
-    group,
-    state,
-    lost,
-    fresh,
-    step,
-    first_step,
-    n_steps,
-    channels,
-    out,
-    out_row,
-    angle,
-    angle_row,
-    per_angle,
-    seen,
-    work,
-    wide,
-    near,
-):
-    """Advance every lane by ``n_steps``; parameters are those of ``_line_kernels.integrate``."""
-    n = width(work)
-    n_dof, n_meshes = len(group.force) // n, group.n_meshes
-    n_channels = len(channels) if out_row >= 0 else 0
-    machine = machine_rows(work, n_meshes, n)
-    begin(group, step, state, work)
-    starting = is_any_fresh(fresh, n)
-    slot, next_slot = EVEN, ODD
-    for number in range(first_step, first_step + n_steps):
-        begin_step(group, number, number == first_step, step, machine, wide)
-        if number == first_step:
-            for m in range(n_meshes):
-                read_begin(group, m, slot, fresh, step, machine, work, wide, near)
-            if starting:
-                start(group, slot, fresh, work, wide, near)
-        if angle_row >= 0 and number % per_angle == 0:
-            write_angles(group, angle, angle_row, machine, wide)
-            if len(seen) > 0:
-                for m in range(n_meshes):
-                    own = mesh_rows(work, m, n)
-                    normal = get_row(own, rows.NORMAL)
-                    seen_row = angle_row * n_meshes + m
-                    counts = integer_rows(near, m, n)
-                    write_mesh(seen, seen_row, normal, own, counts)
-            angle_row += 1
-        for m in range(n_meshes):
-            read_mesh(group, m, slot, next_slot, step, lost, machine, work, wide, near)
-        for d in range(n_dof):
-            moved, rate = to_middle(d * lines.N_BLOCKS, step, 1, machine)
-            own_pull(group, d, moved, rate, machine)
-        couple(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
-        govern(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
-        for m in range(n_meshes):
-            push_mesh(
-                group,
-                m,
-                MIDDLE,
-                MIDDLE_AT,
-                0.5 * step,
-                rows.MIDDLE_Q,
-                rows.MIDDLE_V,
-                machine,
-                work,
-                wide,
-                near,
-            )
-        for d in range(n_dof):
-            a = acceleration(group, d, machine)
-            moved, rate = predict(d * lines.N_BLOCKS, a, step, 1, machine)
-            own_pull(group, d, moved, rate, machine)
-        couple(group, rows.END_Q, rows.END_V, machine)
-        govern(group, rows.END_Q, rows.END_V, machine)
-        for m in range(n_meshes):
-            push_mesh(
-                group,
-                m,
-                next_slot,
-                END_AT,
-                step,
-                rows.END_Q,
-                rows.END_V,
-                machine,
-                work,
-                wide,
-                near,
-            )
-        for d in range(n_dof):
-            a = acceleration(group, d, machine)
-            conclude(d * lines.N_BLOCKS, a, step, 1, machine)
-        for m in range(n_meshes):
-            end_mesh(group, m, next_slot, step, machine, work, near)
-        out_first = (out_row + number - first_step) * n_channels
-        write_means(group, channels, n_channels, out, out_first, machine)
-        slot, next_slot = next_slot, slot
-    if slot == ODD:
-        for m in range(n_meshes):
-            own, own_wide = mesh_rows(work, m, n), wide_rows(wide, m, n)
-            keep_begin(own, own_wide, integer_rows(near, m, n))
-    end(group, state, machine)
-    return angle_row
-
-
-integrates(integrate, ChordLineGroup)
-
-
-@compiled
-def read_begin(group, m, slot, fresh, step, machine, work, wide, near):
+def begin_mesh(group, m, slot, fresh, step, machine, work, wide, near):
     """Read the tables of a mesh at the begin of the first step of a call."""
     n = width(work)
     mesh, own = chord_mesh_of(group, m, n), mesh_rows(work, m, n)
@@ -192,21 +72,8 @@ def read_begin(group, m, slot, fresh, step, machine, work, wide, near):
     any_law.read_begin(mesh, slot, fresh, step, approach, rate, own, own_wide, counts)
 
 
-@compiled
-def start(group, slot, fresh, work, wide, near):
-    """Set what the step remembers in the lanes that are fresh, from one evaluation there."""
-    n = width(work)
-    machine = machine_rows(work, group.n_meshes, n)
-    pull_at_begin(group, machine)
-    for m in range(group.n_meshes):
-        _start_mesh(group, m, slot, fresh, machine, work, wide, near)
-    for lane in range(n):
-        machine[at(rows.FRESH, lane, n)] = fresh[lane]
-    accelerate_fresh(group, get_row(machine, rows.FRESH), machine)
-
-
 @inlined
-def _start_mesh(group, m, slot, fresh, machine, work, wide, near):
+def start_mesh(group, m, slot, fresh, by_tooth, machine, work, wide, near):
     """Push by a mesh at the begin of a step, and set what it remembers where it is fresh."""
     n = width(work)
     mesh, own = chord_mesh_of(group, m, n), mesh_rows(work, m, n)
@@ -231,6 +98,13 @@ def _start_mesh(group, m, slot, fresh, machine, work, wide, near):
             choose(get_row(own, rows.FRESH), margin_row(rows.BEGIN_AT, k), margin, own)
 
 
+@inlined
+def write_mesh(group, m, seen, row, work, wide, near):
+    """Write the state of the pairs of a mesh at the begin of a step."""
+    own, counts = mesh_rows(work, m, width(work)), integer_rows(near, m, width(work))
+    _slots.write_mesh(seen, row, get_row(own, rows.NORMAL), own, counts)
+
+
 @written
 def _keep_others(row, kept, own):
     """Take a row back from where it was kept in the lanes that are not fresh."""
@@ -248,15 +122,11 @@ def _set_ahead(slot, own, own_wide):
 
 
 @inlined
-def read_mesh(group, m, slot, next_slot, step, lost, machine, work, wide, near):
+def read_mesh(group, m, slot, next_slot, step, by_tooth, machine, work, wide, near):
     """Read the tables of a mesh at the end of the step, and set those in its middle."""
     n = width(work)
     mesh, own = chord_mesh_of(group, m, n), mesh_rows(work, m, n)
     own_wide, counts = wide_rows(wide, m, n), integer_rows(near, m, n)
-    zero, one = spread(work, 0.0), spread(work, 1.0)
-    normal = get_row(own, rows.NORMAL)
-    apart = where_above(normal * normal, zero, zero, one)
-    set_row(lost, m, get_row(lost, m) + apart)
     approach, rate = motion(group, m, rows.Q, rows.V, machine)
     any_law.look_ahead(mesh, step, approach, rate, own)
     ahead = step * get_row(mesh.numbers, layout.PINION_RADIUS)
@@ -347,6 +217,20 @@ def push_mesh(group, m, slot, instant, since, q, v, machine, work, wide, near):
 
 
 @inlined
+def push_middle(group, m, step, machine, work, wide, near):
+    """Evaluate the law of a mesh in the middle of the step and add its forces."""
+    q, v, since = rows.MIDDLE_Q, rows.MIDDLE_V, 0.5 * step
+    push_mesh(group, m, MIDDLE, MIDDLE_AT, since, q, v, machine, work, wide, near)
+
+
+@inlined
+def push_end(group, m, slot, step, machine, work, wide, near):
+    """Evaluate the law of a mesh at the end of the step and add its forces."""
+    q, v = rows.END_Q, rows.END_V
+    push_mesh(group, m, slot, END_AT, step, q, v, machine, work, wide, near)
+
+
+@inlined
 def end_mesh(group, m, slot, step, machine, work, near):
     """Correct the end of the step for the kinks of a mesh, and shift what it remembers."""
     n = width(work)
@@ -375,3 +259,24 @@ def _correct(group, mesh, m, step, first, last, machine, own):
     short = missed_law(mesh, rows.ANY_SHORT, first, last, own)
     early = missed_law(mesh, rows.ANY_EARLY, first, last, own)
     correct_by(group, m, short, early, step, changed, machine)
+
+
+@inlined
+def keep_mesh(m, work, wide, near):
+    """Keep the slot of the next step's begin where a call begins."""
+    n = width(work)
+    own, own_wide = mesh_rows(work, m, n), wide_rows(wide, m, n)
+    keep_begin(own, own_wide, integer_rows(near, m, n))
+
+
+integrate = line_integrator(
+    begin_mesh=begin_mesh,
+    start_mesh=start_mesh,
+    write_mesh=write_mesh,
+    read_mesh=read_mesh,
+    push_middle=push_middle,
+    push_end=push_end,
+    end_mesh=end_mesh,
+    keep_mesh=keep_mesh,
+)
+integrates(integrate, ChordLineGroup)
