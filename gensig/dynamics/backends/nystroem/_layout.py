@@ -72,7 +72,9 @@ N_WIDE = LAST_CELL + 1
 
 # integer rows behind those of ``gensig.dynamics._layout``: the newest pair at the last margins
 MARGINS_OF = layout.N_COUNTS
-N_COUNTS = MARGINS_OF + 1
+# 1 in its first place if a pair or a chord changes in the step
+RECHOSEN = MARGINS_OF + 1
+N_COUNTS = RECHOSEN + 1
 
 
 class NystroemGroup(Group):
@@ -110,7 +112,7 @@ def scratch(n_dof, n_channels, precision="float64"):
 
 
 def any_law_scratch(n_dof, n_channels, precision="float64"):
-    """Work rows, float64 rows and integer rows of ``_any_law_kernels.integrate``."""
+    """Work rows, float64 rows and integer rows of ``_any_law_pair.integrate``."""
     n = n_lanes(precision)
     n_blocks = N_BLOCKS * MOST_HELICAL_DOFS
     work = np.zeros((N_FIXED + n_blocks) * n, dtype=precision)

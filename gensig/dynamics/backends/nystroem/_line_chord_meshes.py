@@ -1,17 +1,16 @@
 """Meshes of a line of which some are helical or of high contact ratio.
 
-Law, tables and kinks are those of ``_any_law_kernels``; spur teeth have one chord.
+Law, tables and kinks are those of ``_any_law_pair``; spur teeth have one chord.
 """
 
 from __future__ import annotations
 
 from gensig.dynamics import _layout as layout
 from gensig.dynamics import _slots
-from gensig.dynamics._layout import AHEAD, BASE, MIDDLE, PART, ROLL
+from gensig.dynamics._layout import AHEAD, MIDDLE, PART
 from gensig.dynamics._mesh_kernels import mesh_law
 from gensig.dynamics._record_kernels import integrates
-from gensig.dynamics._slots import keep_begin, near_pairs, roll_ahead
-from gensig.dynamics._tables import between, chords_between, cover, gather
+from gensig.dynamics._slots import keep_begin, near_pairs
 from gensig.dynamics._vector import (
     any_above,
     at,
@@ -24,7 +23,7 @@ from gensig.dynamics._vector import (
     width,
 )
 from gensig.dynamics._written import written
-from gensig.dynamics.backends.nystroem import _any_law_kernels as any_law
+from gensig.dynamics.backends.nystroem import _any_law_pair as any_law
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem import _line_layout as lines
 from gensig.dynamics.backends.nystroem._any_law_kinks import (
@@ -36,8 +35,7 @@ from gensig.dynamics.backends.nystroem._any_law_kinks import (
     miss,
     missed_law,
 )
-from gensig.dynamics.backends.nystroem._chord_kinks import miss_chords, read_again
-from gensig.dynamics.backends.nystroem._kernels import choose
+from gensig.dynamics.backends.nystroem._chord_kinks import miss_chords
 from gensig.dynamics.backends.nystroem._layout import END_AT, MIDDLE_AT
 from gensig.dynamics.backends.nystroem._line_kernels import line_integrator
 from gensig.dynamics.backends.nystroem._line_layout import (
@@ -57,6 +55,7 @@ from gensig.dynamics.backends.nystroem._line_meshes import (
     touched,
     turning_speed,
 )
+from gensig.dynamics.backends.nystroem._pair_kernels import choose
 
 
 @compiled
@@ -80,14 +79,14 @@ def start_mesh(group, m, slot, fresh, by_tooth, machine, work, wide, near):
     own_wide, counts = wide_rows(wide, m, n), integer_rows(near, m, n)
     for lane in range(n):
         own[at(rows.FRESH, lane, n)] = fresh[lane]
-    _set_ahead(slot, own, own_wide)
+    any_law.set_ahead(slot, own, own_wide)
     _set_begun(group, m, machine, own)
     # what the other lanes remember waits in other rows
     set_row(own, rows.ANY_EARLY, get_row(own, rows.NORMAL))
     for k in range(layout.MOST_PAIRS):
         set_row(own, rows.ANY_SHORT + k, get_row(own, layout.PAIR_FORCE + k))
     first, last = near_pairs(slot, n, counts)
-    _keep_near(first, last, n, counts)
+    any_law.keep_near(first, last, n, counts)
     push_mesh(group, m, slot, END_AT, 0.0, rows.Q, rows.V, machine, work, wide, near)
     count_anew(mesh, own, counts)
     _keep_others(rows.NORMAL, rows.ANY_EARLY, own)
@@ -113,15 +112,6 @@ def _keep_others(row, kept, own):
 
 
 @inlined
-def _set_ahead(slot, own, own_wide):
-    """Set the roll of a slot since the begin of the step, in the precision of the scratch."""
-    n = width(own)
-    for lane in range(n):
-        ahead = own_wide[at(ROLL + slot, lane, n)] - own_wide[at(BASE, lane, n)]
-        own[at(AHEAD + slot, lane, n)] = ahead
-
-
-@inlined
 def read_mesh(group, m, slot, next_slot, step, by_tooth, machine, work, wide, near):
     """Read the tables of a mesh at the end of the step, and set those in its middle."""
     n = width(work)
@@ -132,7 +122,7 @@ def read_mesh(group, m, slot, next_slot, step, by_tooth, machine, work, wide, ne
     ahead = step * get_row(mesh.numbers, layout.PINION_RADIUS)
     ahead = ahead * _mean_speed(group, m, step, machine)
     set_row(own, AHEAD + next_slot, ahead)
-    _read(mesh, slot, next_slot, approach, own, own_wide, counts)
+    any_law.read_slots(mesh, slot, next_slot, approach, own, own_wide, counts)
     _set_begun(group, m, machine, own)
 
 
@@ -143,14 +133,6 @@ def _set_begun(group, m, machine, own):
     set_row(own, lines.BEGUN, get_row(machine, turned))
 
 
-@inlined
-def _keep_near(first, last, n, counts):
-    """Keep which pairs come near in the step; no step of this core has parts."""
-    span = layout.span_index(PART, n)
-    counts[span + layout.FIRST_NEAR_PAIR] = first
-    counts[span + layout.LAST_NEAR_PAIR] = last
-
-
 @written
 def _mean_speed(group, m, step, machine):
     """Speed of gear a in the middle of the step, with every force at its begin, rad/s."""
@@ -159,27 +141,6 @@ def _mean_speed(group, m, step, machine):
     gain = ratio(group, m, machine) * get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
     gain = gain + get_row(machine, turned)
     return turning_speed(group, m, rows.V, zero, machine) + (0.5 * step) * gain
-
-
-@compiled
-def _read(mesh, slot, next_slot, approach, own, own_wide, counts):
-    """Read a mesh where ``AHEAD`` of the next slot says, and keep which pairs come near."""
-    n = width(own)
-    roll_ahead(next_slot, own, own_wide)
-    set_row(own, layout.FLAGS, spread(own, 1.0))
-    rechosen = gather(mesh, next_slot, True, own, own_wide, counts)
-    counts[lines.RECHOSEN * n] = rechosen
-    if rechosen:
-        read_again(mesh, slot, approach, own, own_wide, counts)
-    first, last = near_pairs(slot, n, counts)
-    first_end, last_end = near_pairs(next_slot, n, counts)
-    first, last = min(first, first_end), max(last, last_end)
-    cover(slot, first, last, own, counts)
-    cover(next_slot, first, last, own, counts)
-    _set_ahead(slot, own, own_wide)
-    between(slot, next_slot, MIDDLE, first, last, own)
-    chords_between(slot, next_slot, MIDDLE, first, last, own)
-    _keep_near(first, last, n, counts)
 
 
 @compiled
@@ -244,7 +205,7 @@ def end_mesh(group, m, slot, step, machine, work, near):
         # the approach counts under the paper's law alone, which drive lines do not have
         miss(mesh, zero, first, last, own)
         _correct(group, mesh, m, step, first, last, machine, own)
-    if counts[lines.RECHOSEN * n]:
+    if counts[rows.RECHOSEN * n]:
         approach, _ = motion(group, m, rows.END_Q, rows.END_V, machine)
         miss_chords(mesh, slot, approach, first, last, own)
         _correct(group, mesh, m, step, first, last, machine, own)

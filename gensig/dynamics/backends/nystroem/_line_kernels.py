@@ -29,7 +29,6 @@ from gensig.dynamics._vector import (
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem import _line_layout as lines
 from gensig.dynamics.backends.nystroem._flat import number_at
-from gensig.dynamics.backends.nystroem._kernels import RECENTER, choose
 from gensig.dynamics.backends.nystroem._line_layout import (
     machine_rows,
     mesh_of,
@@ -50,6 +49,7 @@ from gensig.dynamics.backends.nystroem._motion import (
     predict,
     to_middle,
 )
+from gensig.dynamics.backends.nystroem._pair_kernels import RECENTER, choose
 
 
 def line_integrator(

@@ -27,9 +27,6 @@ AHEAD = layout.AHEAD
 BEGUN = layout.BEGUN
 # of the machine: pull of the governor on each of ``held``; no torque has a row of its own
 PULL = rows.DRIVE + layout.DRIVE_TORQUE
-# integer row of a mesh with chords: 1 in its first place if a pair or a chord changes in the step
-RECHOSEN = rows.N_COUNTS
-N_COUNTS = RECHOSEN + 1
 # degrees of freedom that a mesh acts on: x, y and rotation of its driving gear a and its driven
 # gear b; NONE for a gear that does not move so
 A_X, A_Y, A_TURN, B_X, B_Y, B_TURN, N_TOUCHED = range(7)
@@ -207,7 +204,7 @@ def wide_rows(wide, m, n):
 @written
 def integer_rows(near, m, n):
     """Rows of one mesh in the integer scratch; a view."""
-    return tail(near, m * (N_COUNTS * n))
+    return tail(near, m * (rows.N_COUNTS * n))
 
 
 @written
@@ -220,5 +217,5 @@ def line_scratch(n_meshes, n_dof, precision="float64"):
     """Work rows, float64 rows and integer rows of ``integrate`` for so many meshes."""
     n = n_lanes(precision)
     work = np.zeros((n_meshes * rows.N_FIXED + N_BLOCKS * n_dof) * n, dtype=precision)
-    near = np.zeros(n_meshes * N_COUNTS * n, dtype=np.int64)
+    near = np.zeros(n_meshes * rows.N_COUNTS * n, dtype=np.int64)
     return work, np.zeros(n_meshes * rows.N_WIDE * n), near

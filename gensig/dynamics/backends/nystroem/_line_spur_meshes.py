@@ -16,10 +16,9 @@ from gensig.dynamics._vector import (
     where_above,
     width,
 )
-from gensig.dynamics.backends.nystroem import _kernels
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem import _line_layout as lines
-from gensig.dynamics.backends.nystroem._kernels import choose
+from gensig.dynamics.backends.nystroem import _spur_pair
 from gensig.dynamics.backends.nystroem._kinks import kinked
 from gensig.dynamics.backends.nystroem._law import mesh_law
 from gensig.dynamics.backends.nystroem._layout import FOLLOWED
@@ -41,6 +40,7 @@ from gensig.dynamics.backends.nystroem._line_meshes import (
     touched,
     turning_speed,
 )
+from gensig.dynamics.backends.nystroem._pair_kernels import choose
 from gensig.dynamics.backends.nystroem._pairs import (
     first_pairs,
     locate,
@@ -100,7 +100,7 @@ def write_mesh(group, m, seen, row, work, wide, near):
     """Write the state of the pairs of a mesh at the begin of a step."""
     n = width(work)
     own, own_wide = mesh_rows(work, m, n), wide_rows(wide, m, n)
-    _kernels.write_mesh(mesh_of(group, m, n), seen, row, own, own_wide)
+    _spur_pair.write_mesh(mesh_of(group, m, n), seen, row, own, own_wide, near)
 
 
 @inlined

@@ -14,7 +14,7 @@ from gensig.dynamics._vector import aligned, n_lanes
 from gensig.dynamics.backends.base import Backend, Integration, Motions
 from gensig.dynamics.backends.group_motions import in_order, integrate_machines
 from gensig.dynamics.backends.group_run import Core
-from gensig.dynamics.backends.nystroem import _any_law_kernels, _kernels
+from gensig.dynamics.backends.nystroem import _any_law_pair, _spur_pair
 from gensig.dynamics.backends.nystroem._layout import (
     AnyLawGroup,
     HelicalNystroemGroup,
@@ -90,14 +90,14 @@ def coarsest_oversampling(
 THREE_PAIRS = Core(
     pack=pack_pairs,
     scratch=scratch,
-    integrate=_kernels.integrate,
+    integrate=_spur_pair.integrate,
     coarsest_oversampling=coarsest_oversampling,
     settling_time=settling_time,
 )
 ANY_LAW = Core(
     pack=pack_any_law,
     scratch=any_law_scratch,
-    integrate=_any_law_kernels.integrate,
+    integrate=_any_law_pair.integrate,
     coarsest_oversampling=coarsest_oversampling,
     settling_time=settling_time,
 )
