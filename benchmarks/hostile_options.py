@@ -205,21 +205,19 @@ NEEDS = {"excitation": ("system=two_stage_gearbox",), "heat": ("system=helical_p
 def _dry_run(words: list[str], folder: Path) -> None:
     """Everything that ``gensig plan`` does before it simulates."""
     from gensig.execution.registry import read_executor
-    from gensig.plan.make import make_plan, read_counts
+    from gensig.plan.make import count_records, make_plan
     from gensig.plan.request import read_request
     from gensig.record.inputs import InputReader
-    from gensig.record.options import read_dataset_options
 
     config = read_request(words, config_dir=folder).config
     read_executor(config["executor"])
-    read_dataset_options(config)
-    if (
-        config["life"].get("kind") is None
-        and read_counts(config).n_records > MOST_RECORDS
-    ):
+    reader = InputReader(config)
+    _ = reader.dataset  # refused where its values are no options
+    is_planned = config["life"].get("kind") is None
+    if is_planned and count_records(reader).n_records > MOST_RECORDS:
         return
     plan = make_plan(config)
-    InputReader(config).inputs(plan.record(0))
+    reader.inputs(plan.record(0))
 
 
 def run(chosen: list[Case]) -> Iterator[tuple[Case, str, str]]:

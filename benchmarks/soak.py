@@ -224,17 +224,18 @@ def read_while_made(out: str) -> int:
 
 
 def recorded_row_of(out: str, index: int):  # type: ignore[no-untyped-def]
-    """Configuration and row of a record of an unfinished set."""
+    """Reader and row of a record of an unfinished set."""
     from gensig.dataset.folder.joining import joined_folder
     from gensig.dataset.folder.layout import PLAN
     from gensig.dataset.plan import PlanRows
     from gensig.options.configuration import Configuration
+    from gensig.record.inputs import InputReader
 
     with suppress(GensigError):
         return recorded_row(Path(out), str(index))
     _, config = joined_folder(Path(out))
     (row,) = PlanRows(Path(out) / PLAN).records(index, 1)
-    return Configuration(config), row
+    return InputReader(Configuration(config)), row
 
 
 def readers(folder: Path, _n_records: int) -> bool:

@@ -27,7 +27,7 @@ from gensig.mesh import body_coupling
 from gensig.mesh.options import MeshOptions
 from gensig.mesh.pair_table import structural_compliance
 from gensig.plan.request import read_request
-from gensig.systems.registry import read_spur_pair
+from gensig.systems.registry import read_system
 
 Array = NDArray[np.float64]
 
@@ -101,7 +101,7 @@ def main() -> None:
     wanted = parser.parse_args()
     figures: dict[str, dict[str, float]] = {}
     systems = {
-        name: read_spur_pair(read_request(words).config)
+        name: read_system(read_request(words).config)
         for name, words in CONVENTIONS.items()
     }
     system = systems["default terms"]

@@ -34,6 +34,7 @@ from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.production.folder import begin_folder
 from gensig.production.shard_writing import open_shard
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import Record, simulate_records
 
 N_SIMULATED = 16
@@ -49,7 +50,7 @@ def simulated(config: Configuration) -> list[Record]:
     """As many records as the plan has: simulated ones, repeated with another noise each time."""
     plan = make_plan(config)
     rows = [plan.record(place) for place in range(plan.n_records)]
-    made = simulate_records(config, rows[:N_SIMULATED])
+    made = simulate_records(InputReader(config), rows[:N_SIMULATED])
     rng = np.random.default_rng(0)
     records = []
     for place, row in enumerate(rows):
@@ -87,7 +88,7 @@ def shard(
     path, digests = shard_path(out, 0), []
 
     def write() -> None:
-        with open_shard(path, config, len(records), params) as writer:
+        with open_shard(path, InputReader(config), len(records), params) as writer:
             for row, record in enumerate(records):
                 writer.write(row, record.signals, record.values)
         digests.append(writer.sha256)

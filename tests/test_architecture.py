@@ -85,7 +85,7 @@ GENSIG = {
         "systems units"
     ),
     "production": (
-        "compilation dataset dynamics errors execution faults life options plan record "
+        "compilation dataset dynamics errors execution faults options plan record "
         "sensing systems terminal text units version"
     ),
     "record": (

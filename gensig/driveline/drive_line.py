@@ -132,7 +132,7 @@ def read_drive_line(config: Configuration) -> DriveLine:
             "writes both) or two of "
             f"{', '.join(shipped_tables())}"
         )
-    material = read_material(config)
+    material = read_material(config.section("material"))
     shafting = read_shafting("system.shafting_csv", options.shafting_csv)
     gear_rows = []
     if options.gears_csv is not None:

@@ -23,16 +23,13 @@ from gensig.driveline.running import named_by_side
 from gensig.errors import ConfigError
 from gensig.life.root.strength import Strength
 from gensig.mesh.options import (
-    read_mesh_options,
-    read_slice_options,
     refuse_papers_heat,
 )
 from gensig.options.configuration import Configuration
 from gensig.sensing.manufacturing import Quality
-from gensig.systems.registry import read_material, read_modification
+from gensig.systems.registry import PairParts
 from gensig.systems.root_strength import GearStress, RootHistory, RootStrength
 from gensig.systems.sliced_pair import SlicedPair
-from gensig.units import read
 
 Array = NDArray[np.float64]
 
@@ -156,25 +153,25 @@ def read_mesh_strength(
 
     Flanks, material and strength of the configuration.
     """
-    mesh_section = config.section("mesh")
+    parts = PairParts(config)
     # the mesh code knows gears by their sides, the tables by the names of the machine
     pair = named_by_side(line.drive.pairs[mesh])
-    modification = read_modification(config)
+    modification = parts.modification
     if not modification.is_any:
         modification = line.drive.relief(mesh)
     flanks = SlicedPair(
         pair=pair,
-        material=read_material(config),
-        mesh=refuse_papers_heat(read_mesh_options(mesh_section), "a drive line"),
-        slices=read_slice_options(mesh_section),
+        material=parts.material,
+        mesh=refuse_papers_heat(parts.mesh, "a drive line"),
+        slices=parts.slices,
         modification=modification,
         torque=0.0,
     )
     return RootStrength(
         flanks=flanks,
         sliced=flanks.modification.is_any or pair.pinion.helix_angle != 0.0,
-        strength=read(Strength, config.section("strength"), "strength"),
-        grade=read(Quality, config.section("quality"), "quality").iso1328_grade,
+        strength=config.section("strength").read(Strength),
+        grade=config.section("quality").read(Quality).iso1328_grade,
     )
 
 

@@ -18,13 +18,9 @@ from gensig.driveline.running import (
 )
 from gensig.driveline.teeth import ToothLaw, sound_meshes
 from gensig.driveline.time.newmark import LineSolver
-from gensig.mesh.options import (
-    read_mesh_options,
-    read_slice_options,
-    refuse_papers_heat,
-)
+from gensig.mesh.options import refuse_papers_heat
 from gensig.options.configuration import Configuration
-from gensig.systems.registry import read_material
+from gensig.systems.registry import PairParts
 
 Array = NDArray[np.float64]
 
@@ -61,16 +57,20 @@ class TimeResponse:
     energy_residual: float
 
 
+def read_tooth_law(config: Configuration) -> ToothLaw:
+    """Material, conventions and slices of a drive line's teeth, which are not modified."""
+    parts = PairParts(config)
+    return ToothLaw(
+        material=parts.material,
+        options=refuse_papers_heat(parts.mesh, "a drive line"),
+        slices=parts.slices,
+    )
+
+
 def tabulated_meshes(
-    machine: EngineLine, config: Configuration, speed: float, torque: float
+    machine: EngineLine, law: ToothLaw, speed: float, torque: float
 ) -> dict[int, TabulatedMesh]:
     """Tables of healthy teeth by the index of their mesh, each under its mean force."""
-    mesh = config["mesh"]
-    law = ToothLaw(
-        material=read_material(config),
-        options=refuse_papers_heat(read_mesh_options(mesh), "a drive line"),
-        slices=read_slice_options(mesh),
-    )
     return sound_meshes(machine, law, mesh_forces(machine, speed, torque))
 
 

@@ -9,18 +9,13 @@ from gensig.driveline.hot_line import hot_line
 from gensig.driveline.machine import LineMachine
 from gensig.dynamics.integrator import Solver
 from gensig.errors import ConfigError
-from gensig.mesh.options import (
-    read_mesh_options,
-    read_slice_options,
-    refuse_papers_heat,
-)
+from gensig.mesh.options import refuse_papers_heat
 from gensig.operation.options import read_operating
-from gensig.options.configuration import Configuration
+from gensig.options.configuration import Configuration, Section
 from gensig.sensing.chain import stands_for_channels
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.options import read_sensing
-from gensig.systems.registry import read_heat, read_material, read_modification
-from gensig.units import read
+from gensig.systems.registry import PairParts
 
 
 def read_line_machine(config: Configuration) -> LineMachine:
@@ -30,47 +25,42 @@ def read_line_machine(config: Configuration) -> LineMachine:
     ------
     ConfigError    for keys or tables that make no engine, and for a mesh that has no records
     """
-    engine = read_engine_line(_with_lateral_motion(config))
+    if _moves_laterally(config.section("system"), config.section("sensing")):
+        config = config.with_keys("system", lateral=True)
+    engine = read_engine_line(config)
     mesh_number = _record_mesh(engine)
-    operating, quality = (
-        read_operating(config.section("operating")),
-        read(Quality, config.section("quality"), "quality"),
-    )
+    parts = PairParts(config)
+    operating = read_operating(config.section("operating"))
+    quality = config.section("quality").read(Quality)
     machine = LineMachine(
-        material=read_material(config),
-        mesh=refuse_papers_heat(
-            read_mesh_options(config.section("mesh")), "a drive line"
-        ),
+        material=parts.material,
+        mesh=refuse_papers_heat(parts.mesh, "a drive line"),
         operating=operating,
         sensing=read_sensing(config.section("sensing")),
         quality=quality,
-        solver=read(Solver, config.section("solver"), "solver"),
+        solver=config.section("solver").read(Solver),
         engine=engine,
         mesh_number=mesh_number,
-        slices=read_slice_options(config.section("mesh")),
-        modification=read_modification(config),
+        slices=parts.slices,
+        modification=parts.modification,
     )
     machine = replace(
         machine,
         operating=replace(operating, speed=operating.speed * machine.ratio),
         sensing=machine.sensing.of_machine(machine.channels),
     )
-    heat = read_heat(config)
-    if heat.is_any:
-        return hot_line(machine, heat)
+    if parts.heat.is_any:
+        return hot_line(machine, parts.heat)
     return machine
 
 
-def _with_lateral_motion(config: Configuration) -> Configuration:
-    """A configuration whose ``system.lateral`` null is true where channels or nuisances need it."""
-    if config.section("system").get("lateral") is not None:
-        return config
-    sensing = config.section("sensing")
+def _moves_laterally(system: Section, sensing: Section) -> bool:
+    """True where ``system.lateral`` is null and channels or nuisances need lateral motion."""
+    if system.get("lateral") is not None:
+        return False
     names = [str(name) for name in sensing.get("channels") or ()]
     has_bearing = any(name.endswith(("_x", "_y")) for name in names)
-    every = stands_for_channels(names)
-    needed = has_bearing or every or bool(sensing.get("nuisances"))
-    return config.with_keys("system", lateral=needed)
+    return has_bearing or stands_for_channels(names) or bool(sensing.get("nuisances"))
 
 
 def _record_mesh(engine: EngineLine) -> int:

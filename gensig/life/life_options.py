@@ -15,7 +15,6 @@ from gensig.life.growth import GrowthOptions
 from gensig.life.load_history import DrawnBlocks
 from gensig.life.pit_growth import PitGrowthOptions
 from gensig.life.snapshots import SPACINGS
-from gensig.options.configuration import Configuration
 from gensig.units import check_choice, check_positive, is_number, read, to_si, unit
 
 RUN_TO_FAILURE = "run_to_failure"
@@ -95,9 +94,9 @@ class LifeOptions:
             )
 
 
-def runs_to_failure(config: Configuration) -> bool:
-    """True where the units of a configuration live; earlier versions have no ``life``."""
-    return config.get("life", {"kind": NO_LIFE})["kind"] != NO_LIFE
+def runs_to_failure(life: Mapping[str, Any] | None) -> bool:
+    """True where the group ``life`` lets units fail; earlier versions have none."""
+    return life is not None and life["kind"] != NO_LIFE
 
 
 def read_life(life: Mapping[str, Any]) -> LifeOptions:

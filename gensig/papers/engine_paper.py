@@ -17,7 +17,12 @@ from gensig.driveline.excitation.cycle_statistics import (
     fluctuations,
     order_amplitudes,
 )
-from gensig.driveline.in_time import TimeResponse, tabulated_meshes, time_response
+from gensig.driveline.in_time import (
+    TimeResponse,
+    read_tooth_law,
+    tabulated_meshes,
+    time_response,
+)
 from gensig.driveline.linear.forced import Waterfall, run_of_speeds
 from gensig.driveline.time_root_stress import root_stress_in_time
 from gensig.options.compose import compose
@@ -71,7 +76,9 @@ def _motion(words: tuple[str, ...]) -> TimeResponse:
         line,
         point.speed,
         point.torque,
-        tabulated=tabulated_meshes(line, config, point.speed, point.torque),
+        tabulated=tabulated_meshes(
+            line, read_tooth_law(config), point.speed, point.torque
+        ),
         nodes=tuple(NODES.values()),
         duration=DURATION,
     )

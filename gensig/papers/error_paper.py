@@ -11,7 +11,7 @@ from gensig.papers.paper_figure import Curve, Panel, Paper, PaperFigure
 from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
 from gensig.systems.helical_pair import HelicalPair
 from gensig.systems.pair_machine import pair_dynamics
-from gensig.systems.registry import read_helical_pair, read_sliced_pair
+from gensig.systems.registry import PairParts, helical_pair, read_sliced_pair
 from gensig.systems.run import Run
 from gensig.units import to_si
 
@@ -117,8 +117,8 @@ def run_up() -> PaperFigure:
     for title, more in (("aligned", ()), ("5.2 um misaligned", (MISALIGNED,))):
         curves = []
         for scheme, (modification, _) in SCHEMES.items():
-            system = read_helical_pair(
-                compose("generate", (SYSTEM, modification, *more))
+            system = helical_pair(
+                PairParts(compose("generate", (SYSTEM, modification, *more)))
             )
             curves.append(Curve(label=scheme, x=SPEEDS_RPM, y=run_up_level(system)))
         panels.append(

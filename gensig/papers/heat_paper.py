@@ -20,7 +20,7 @@ from gensig.systems.hot_pair import (
     sweep,
 )
 from gensig.systems.hot_pair import PAPER as BY_EQUATIONS
-from gensig.systems.registry import read_duty
+from gensig.systems.registry import PairParts
 
 PAIR = ("system=helical_pair", "gear=chongqing_40_162", "heat=chongqing_rated")
 # the paper's: table 1, independent slices with linear contact, gears and housing alike
@@ -72,7 +72,7 @@ STEEPER = (
 @cache
 def duty(convention: str) -> Duty:
     """The paper's second pair at work."""
-    return read_duty(compose("generate", CONVENTIONS[convention]))
+    return PairParts(compose("generate", CONVENTIONS[convention])).duty
 
 
 def stiffness() -> PaperFigure:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from typing import Any
 
 from gensig.dataset.distributions import read_distribution
 from gensig.errors import ConfigError
@@ -17,8 +18,9 @@ from gensig.operation.options import (
     read_ripple,
     read_schedule,
 )
-from gensig.options.configuration import Configuration
+from gensig.options.configuration import Configuration, Section
 from gensig.plan.draws import drawn_gears
+from gensig.record.inputs import InputReader
 from gensig.record.machines import read_machine
 from gensig.record.options import GEAR_KEYS
 from gensig.units import to_si
@@ -64,10 +66,10 @@ def settle_courses(config: Configuration, typed: Collection[str]) -> Configurati
         )
     steady = dict.fromkeys((*QUANTITIES, *RIPPLES))
     system = read_machine(config.with_keys("operating", **steady))
-    least = least_speed(config, system.operating.speed)
+    least = least_speed(config["operating"], vary, system.operating.speed)
     turning = {schedule.turns_of}
     if schedule.turns_of == "faulted":
-        turning = _faulted(config) & set(system.gears)
+        turning = _faulted(InputReader(config)) & set(system.gears)
     if turning - {"pinion"}:
         _refuse_varied_teeth(vary)
     slowdown = max([system.pinion_turns[gear] for gear in turning], default=1.0)
@@ -87,7 +89,7 @@ def _refuse_varied_teeth(vary: Collection[str]) -> None:
             )
 
 
-def least_speed(config: Configuration, set_speed: float) -> float:
+def least_speed(operating: Section, vary: Mapping[str, Any], set_speed: float) -> float:
     """The slowest set speed of the pinion that records of a plan can have, rad/s.
 
     The lower end of what the plan draws (else ``set_speed`` in rad/s), times the smallest factor
@@ -97,7 +99,6 @@ def least_speed(config: Configuration, set_speed: float) -> float:
     ------
     ConfigError    where the plan draws the course itself
     """
-    operating, vary = config["operating"], config["plan"]["vary"]
     for key in vary:
         if key.startswith(("operating.speed_profile.", "operating.speed_ripple.")):
             raise ConfigError(
@@ -119,13 +120,13 @@ def least_speed(config: Configuration, set_speed: float) -> float:
     return set_speed * factor
 
 
-def _faulted(config: Configuration) -> set[str]:
+def _faulted(reader: InputReader) -> set[str]:
     """Gears that carry a fault in any class; all that the plan draws from where it draws."""
     named = {
         str(part.get("gear"))
-        for fault in config["classes"].values()
+        for fault in reader.classes.values()
         for part in fault_parts(fault)
     }
-    if named and (drawn := drawn_gears(config)):
+    if named and (drawn := drawn_gears(reader)):
         return set(drawn)
     return named

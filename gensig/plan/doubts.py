@@ -11,21 +11,19 @@ from gensig.dynamics.decimation import usable_band
 from gensig.errors import GensigError
 from gensig.life.root.root_stress import root_factors
 from gensig.life.root.strength import Strength
-from gensig.options.configuration import Configuration
 from gensig.plan.equal_classes import equal_classes
 from gensig.record.inputs import InputReader
 from gensig.systems.base import Machine
-from gensig.units import from_si, read
+from gensig.units import from_si
 
 # dB; below, the machine is not heard even in an average over a thousand turns; above, the noise
 # is smaller than the last digit of a float32
 SNR_RANGE = (-40.0, 140.0)
 
 
-def plan_doubts(config: Configuration, plan: Plan) -> list[str]:
+def plan_doubts(reader: InputReader, plan: Plan) -> list[str]:
     """A line for each kind of value of a plan that makes no sense; the worst record is named."""
     columns = plan.columns
-    reader = InputReader(config)
 
     def machine_of(column: str) -> Machine:
         """The machine of the record with the largest value of a column."""
@@ -33,9 +31,9 @@ def plan_doubts(config: Configuration, plan: Plan) -> list[str]:
 
     return [
         *_above_the_band(machine_of("speed_set_rpm")),
-        *_too_strong(config, machine_of("torque_nm")),
+        *_too_strong(reader.strength, machine_of("torque_nm")),
         *_absurd_noise(columns["snr_db"]),
-        *equal_classes(config, plan),
+        *equal_classes(reader, plan),
     ]
 
 
@@ -55,9 +53,8 @@ def _above_the_band(machine: Machine) -> Iterator[str]:
         )
 
 
-def _too_strong(config: Configuration, machine: Machine) -> Iterator[str]:
+def _too_strong(strength: Strength, machine: Machine) -> Iterator[str]:
     """A nominal root stress that no tooth bears."""
-    strength = read(Strength, config.section("strength"), "strength")
     bears = strength.bending_limit * strength.test_gear_stress_correction
     try:
         factors = root_factors(machine.pair, allow_extrapolation=True).values()

@@ -21,20 +21,11 @@ from gensig.faults.base import require_gears
 from gensig.faults.registry import COMPOUND, fault_parts, read_faults
 from gensig.geometry.contact import SIDES
 from gensig.geometry.tooth_profile import root_curve_point
-from gensig.life.life_options import runs_to_failure
-from gensig.options.configuration import Configuration
 from gensig.plan.tooth_reach import tooth_reach
 from gensig.plan.unit_designs import unit_load_torque
-from gensig.record.machines import read_machine
-from gensig.record.options import (
-    AS_GIVEN,
-    DRAWN,
-    TORQUE_KEY,
-    draws_unit_load,
-    read_plan_options,
-)
+from gensig.record.inputs import InputReader
+from gensig.record.options import AS_GIVEN, DRAWN, TORQUE_KEY
 from gensig.record.streams import Stream, stream
-from gensig.systems.registry import LINE, read_gear_group, read_pair
 from gensig.units import from_si, split_unit, to_si
 
 # Keys of a distribution that are multiplied by a size where they are shares of it.
@@ -91,16 +82,6 @@ def draw_points(
     )
 
 
-def draw_values(
-    config: Configuration,
-    vary: Mapping[str, Distribution],
-    points: NDArray[np.int64],
-    rng: np.random.Generator,
-) -> dict[str, list[Any]]:
-    """Values of every varied key, (condition,) each; see ``draw_points``."""
-    return draw_points(config["plan"]["design"], vary, points, rng).values(vary)
-
-
 def fault_sizes(fault: Mapping[str, Any]) -> dict[str, float]:
     """Numbers of a fault by key; the keys of a compound fault begin with the part's number."""
     sizes = {
@@ -115,7 +96,7 @@ def fault_sizes(fault: Mapping[str, Any]) -> dict[str, float]:
 
 
 def fault_specs(
-    config: Configuration, fault: Mapping[str, Any]
+    reader: InputReader, fault: Mapping[str, Any]
 ) -> tuple[dict[str, Distribution], dict[str, tuple[int, str]]]:
     """Distributions of a fault by name, and the part and key that each is of.
 
@@ -124,7 +105,7 @@ def fault_specs(
     FaultError     for a gear that the machine does not have
     ConfigError    for a key or a distribution that cannot be drawn
     """
-    require_gears(read_faults(fault), machine_gears(config))
+    require_gears(read_faults(fault), machine_gears(reader))
     specs: dict[str, Distribution] = {}
     parts: dict[str, tuple[int, str]] = {}
     for number, part in enumerate(fault_parts(fault)):
@@ -139,28 +120,28 @@ def fault_specs(
                     f"fault.vary: '{key}' is no key of fault={part['kind']}"
                 )
             name = f"parts.{number}.{key}" if fault["kind"] == COMPOUND else key
-            scaled = _for_gear(config, part, key, spec)
+            scaled = _for_gear(reader, part, key, spec)
             specs[name] = read_distribution(f"fault.vary.{name}", scaled)
             parts[name] = (number, key)
     return specs, parts
 
 
 def draw_class_faults(
-    config: Configuration,
+    reader: InputReader,
     points: NDArray[np.int64],
-    of_units: Sequence[Configuration] = (),
+    of_units: Sequence[InputReader] = (),
 ) -> dict[str, list[dict[str, Any]]]:
     """Faults of every class by its name, one a condition.
 
-    ``of_units`` are the configurations of the units, which the conditions take in turn, where
+    ``of_units`` are the readers of the units, which the conditions take in turn, where
     units differ. Where the plan draws the gear, a condition has the fault of the option as if that
     gear were given: the sizes of all gears are at the same points of their distributions.
     """
-    of_units = of_units or (config,)
-    gears = drawn_gears(config)
+    of_units = of_units or (reader,)
+    gears = drawn_gears(reader)
     faults = {}
-    for index, (name, fault) in enumerate(config["classes"].items()):
-        rng = stream(config.seed, Stream.FAULT, index)
+    for index, (name, fault) in enumerate(reader.classes.items()):
+        rng = stream(reader.seed, Stream.FAULT, index)
         if not gears:
             faults[name] = draw_faults(of_units, fault, points, rng)
             continue
@@ -168,14 +149,14 @@ def draw_class_faults(
             draw_faults(of_units, _on_gear(fault, gear), points, copy.deepcopy(rng))
             for gear in gears
         ]
-        drawn = stream(config.seed, Stream.FAULT_GEAR, index).integers(
+        drawn = stream(reader.seed, Stream.FAULT_GEAR, index).integers(
             len(gears), size=len(points)
         )
         faults[name] = [of_gear[k][i] for i, k in enumerate(drawn.tolist())]
     return faults
 
 
-def drawn_gears(config: Configuration) -> tuple[str, ...]:
+def drawn_gears(reader: InputReader) -> tuple[str, ...]:
     """Gears out of which a plan draws that of each condition's faults; none where it is given.
 
     All gears of the machine, or those that ``plan.fault_gear`` lists. In lives of a drive line
@@ -185,12 +166,12 @@ def drawn_gears(config: Configuration) -> tuple[str, ...]:
     ------
     ConfigError    for a listed gear that the machine does not have
     """
-    chosen = read_plan_options(config).fault_gear
+    chosen = reader.plan.fault_gear
     if chosen == AS_GIVEN:
         return ()
-    allowed = machine_gears(config)
-    if runs_to_failure(config) and config["system"]["kind"] == LINE:
-        gears = read_machine(config).gears
+    allowed = machine_gears(reader)
+    if reader.runs_to_failure and reader.is_line:
+        gears = reader.machine().gears
         allowed = tuple(name for name in allowed if gears[name].helix_angle == 0.0)
     if chosen == DRAWN:
         return allowed
@@ -202,11 +183,11 @@ def drawn_gears(config: Configuration) -> tuple[str, ...]:
     return tuple(chosen)
 
 
-def machine_gears(config: Configuration) -> tuple[str, ...]:
-    """Names of all gears of the machine of a configuration."""
-    if config["system"]["kind"] != LINE:
+def machine_gears(reader: InputReader) -> tuple[str, ...]:
+    """Names of all gears of the machine."""
+    if not reader.is_line:
         return SIDES
-    return tuple(read_machine(config).gears)
+    return tuple(reader.machine().gears)
 
 
 def _on_gear(fault: Mapping[str, Any], gear: str) -> dict[str, Any]:
@@ -218,7 +199,7 @@ def _on_gear(fault: Mapping[str, Any], gear: str) -> dict[str, Any]:
 
 
 def draw_faults(
-    of_units: Sequence[Configuration],
+    of_units: Sequence[InputReader],
     fault: Mapping[str, Any],
     points: NDArray[np.int64],
     rng: np.random.Generator,
@@ -230,10 +211,10 @@ def draw_faults(
     """
     drawn: DrawnPoints | None = None
     faults: list[dict[str, Any]] = [{}] * len(points)
-    for unit, config in enumerate(of_units):
-        specs, part_keys = fault_specs(config, fault)
+    for unit, reader in enumerate(of_units):
+        specs, part_keys = fault_specs(reader, fault)
         if drawn is None:
-            drawn = draw_points(config["plan"]["design"], specs, points, rng)
+            drawn = draw_points(reader.plan.design, specs, points, rng)
         conditions = slice(unit, None, len(of_units))
         values = drawn.values(specs, conditions)
         faults[conditions] = _whole_faults(
@@ -264,43 +245,41 @@ def _whole_faults(
     return faults
 
 
-def _gear_sizes(config: Configuration, gear: str) -> tuple[int, dict[str, float]]:
+def _gear_sizes(reader: InputReader, gear: str) -> tuple[int, dict[str, float]]:
     """Teeth of a gear, and the sizes in mm that a fault may be a share of."""
-    if config["system"]["kind"] != LINE:
-        group = read_gear_group(config)
+    if not reader.is_line:
+        group = reader.parts.gear
         module, values = group["normal_module_mm"], group[gear]
         sizes = {"normal_module": module, "face_width": values["face_width_mm"]}
         return values["n_teeth"], sizes
-    in_table = read_machine(config).gears[gear]
+    in_table = reader.machine().gears[gear]
     return in_table.n_teeth, {
         name: from_si("size_mm", getattr(in_table, name))
         for name in ("normal_module", "face_width")
     }
 
 
-def _root_chord(config: Configuration, gear: str) -> float:
+def _root_chord(reader: InputReader, gear: str) -> float:
     """Thickness of a gear's tooth in the middle of its root curve, where cracks begin, m."""
-    if config["system"]["kind"] == LINE:
-        gears = read_machine(config).gears
+    if reader.is_line:
+        gears = reader.machine().gears
     else:
-        gears = read_pair(config).gears
+        gears = reader.parts.pair.gears
     return 2.0 * root_curve_point(gears[gear], "arc_mid")[1]
 
 
-def _least_reach(config: Configuration, gear: str) -> float:
+def _least_reach(reader: InputReader, gear: str) -> float:
     """Distance that a tooth may stand back and still touch under a plan's least torque, m."""
-    plan = read_plan_options(config)
+    plan, values = reader.plan, {}
     if TORQUE_KEY in plan.vary:
         torque = plan.vary[TORQUE_KEY].least
-        if draws_unit_load(config):
-            torque *= unit_load_torque(read_pair(config))
-        config = config.with_values({TORQUE_KEY: torque})
-    return tooth_reach(read_machine(config), gear)
+        if plan.draws_unit_load:
+            torque *= unit_load_torque(reader.parts.pair)
+        values[TORQUE_KEY] = torque
+    return tooth_reach(reader.machine(values), gear)
 
 
-def _for_gear(
-    config: Configuration, part: Mapping[str, Any], key: str, spec: Any
-) -> Any:
+def _for_gear(reader: InputReader, part: Mapping[str, Any], key: str, spec: Any) -> Any:
     """A distribution of a fault's key in the sizes of its gear.
 
     ``distribution: tooth`` becomes one over the gear's teeth, shares ``of`` a size become lengths.
@@ -311,7 +290,7 @@ def _for_gear(
     if spec.get("distribution") != "tooth" and "of" not in spec and not limits:
         return spec
     gear = part["gear"]
-    n_teeth, sizes = _gear_sizes(config, gear)
+    n_teeth, sizes = _gear_sizes(reader, gear)
     if spec.get("distribution") == "tooth":
         return {**spec, "distribution": "integers", "low": 0, "high": n_teeth - 1}
     unit = split_unit(key)[1]
@@ -332,7 +311,7 @@ def _for_gear(
             elif name in drawn:
                 drawn[name] *= size
         for name, share in shares.items():
-            highest = from_si(key, share * CEILINGS[name](config, gear))
+            highest = from_si(key, share * CEILINGS[name](reader, gear))
             drawn["high"] = min(drawn["high"], highest)
         return drawn
     except (KeyError, TypeError):
@@ -344,7 +323,7 @@ def _for_gear(
 
 # Keys that limit the highest value: to a share of the root chord of the faulted gear, or of the
 # distance that its teeth may stand back and still touch.
-CEILINGS: dict[str, Callable[[Configuration, str], float]] = {
+CEILINGS: dict[str, Callable[[InputReader, str], float]] = {
     "at_most_of_root_chord": _root_chord,
     "at_most_of_reach": _least_reach,
 }

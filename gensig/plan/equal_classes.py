@@ -12,7 +12,6 @@ from gensig.errors import GensigError
 from gensig.faults.base import Fault
 from gensig.faults.broken import MissingTooth
 from gensig.faults.registry import fault_parts
-from gensig.options.configuration import Configuration
 from gensig.plan.tooth_reach import passage_approach, tooth_reach
 from gensig.record.inputs import InputReader, row_faults
 from gensig.systems.base import Machine
@@ -25,7 +24,7 @@ SAME = 1e-9  # relative difference of static approaches that rounding alone can 
 SIZES, DEVIATION = "params/fault.", "_um"
 
 
-def equal_classes(config: Configuration, plan: Plan) -> list[str]:
+def equal_classes(reader: InputReader, plan: Plan) -> list[str]:
     """A line for each class whose largest faults are none, or have the signal of another class.
 
     Compared is the static approach while the faulty tooth passes: all that the motion learns of
@@ -33,14 +32,13 @@ def equal_classes(config: Configuration, plan: Plan) -> list[str]:
     compared with the healthy machine, with a missing tooth, and with the classes before it, on the
     machine of the record with the least torque: there teeth that stand back touch least.
     """
-    reader = InputReader(config)
     if reader.plan.sham:
         return []
     weakest = plan.record(int(np.argmin(plan.columns["torque_nm"])))
     machine = reader.inputs(weakest).machine
     seen: dict[str, list[Array]] = {}
     told = []
-    for name, option in config["classes"].items():
+    for name, option in reader.classes.items():
         if not fault_parts(option):
             continue
         largest, *others = _extreme_faults(plan, name)

@@ -22,19 +22,15 @@ from gensig.geometry.contact import SIDES
 from gensig.life.crack_growth import CrackGrowthOptions
 from gensig.life.growth import GrowthLaw
 from gensig.life.life_options import WearGrowthOptions
-from gensig.life.options import read_wear_options
 from gensig.life.pit_growth import PitGrowthOptions
 from gensig.life.wear.wear_growth import WearGrowth, WearTable, wear_table
-from gensig.options.configuration import Configuration
+from gensig.record.inputs import InputReader
 from gensig.record.vibration_limit import limited_by_vibration
 from gensig.systems.base import Machine, MachineMesh, home_meshes
 from gensig.systems.growth_laws import crack_law, pit_law
 from gensig.systems.wear import OF_PAIR, flank_wear, wear_fault
 
 Array = NDArray[np.float64]
-
-HEALTHY = {"kind": "healthy"}
-
 
 SetPoint = tuple[float, float]
 """Speed in rad/s and torque in N m as the configuration gives them."""
@@ -52,7 +48,7 @@ class LifeGears:
 
     Parameters
     ----------
-    config : of the plan
+    reader : of the plan
     machine : that follows this mesh
     corners : set-points between which those of all units lie
     names : of the pinion and the wheel in the machine of the plan, by their sides of this mesh;
@@ -61,13 +57,13 @@ class LifeGears:
 
     def __init__(
         self,
-        config: Configuration,
+        reader: InputReader,
         machine: Machine,
         corners: Sequence[SetPoint],
         names: Mapping[str, str] = OF_PAIR,
     ) -> None:
         self.machine, self.names = machine, names
-        self._config, self._corners = config, corners
+        self._reader, self._corners = reader, corners
         self._others: dict[str, tuple[LifeGears, str]] = {}
         self._tooth_loads = cache(self._tooth_loads_at)
 
@@ -100,7 +96,7 @@ class LifeGears:
             machine, side = self.machine.at_gear(gear)
             number = home_meshes(self.machine.meshes)[gear]
             names = worn_together(self.machine.meshes, number)
-            there = LifeGears(self._config, machine, self._corners, names)
+            there = LifeGears(self._reader, machine, self._corners, names)
             self._others[gear] = there, side
         return self._others[gear]
 
@@ -110,10 +106,8 @@ class LifeGears:
     @cached_property
     def wear(self) -> WearTable:
         """Wear of the healthy flanks between the mean torques of the corners."""
-        sound = self._config.with_entries(fault=HEALTHY)
-        options = read_wear_options(sound.section("wear"))
-        case = flank_wear(self.machine.flanks, options)
-        case, _ = limited_by_vibration(case, sound, self.names)
+        case = flank_wear(self.machine.flanks, self._reader.wear)
+        case, _ = limited_by_vibration(case, self._reader, self.names)
         means = np.concatenate(self.mean_loads(self._corners))
         return wear_table(case, float(means.min()), float(means.max()))
 

@@ -9,24 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dataset.distributions import GRID
 from gensig.errors import ConfigError
 from gensig.faults.base import require_gears
 from gensig.faults.registry import fault_parts, read_faults
 from gensig.life.growth import Course, GrowthLaw, grow
-from gensig.life.life_options import LifeOptions, read_life
+from gensig.life.life_options import LifeOptions
 from gensig.life.load_history import History, draw_history, given_history
 from gensig.life.snapshots import snapshot_times
-from gensig.options.configuration import Configuration, whole_number
-from gensig.plan.draws import draw_class_faults, draw_values
+from gensig.plan.draws import draw_class_faults, draw_points
 from gensig.plan.growth_table import LAWS, LifeGears, corners
-from gensig.record.machines import read_machine
-from gensig.record.options import (
-    GEAR_KEYS,
-    UNIT_LOAD,
-    draws_unit_load,
-    read_plan_options,
-)
+from gensig.record.inputs import InputReader
+from gensig.record.options import GEAR_KEYS, UNIT_LOAD
 from gensig.record.streams import Stream, stream
 from gensig.systems.base import Machine
 from gensig.units import from_si
@@ -59,7 +52,7 @@ class Snapshot:
     is_last: bool
 
 
-def snapshots(config: Configuration) -> Iterator[Snapshot]:
+def snapshots(reader: InputReader) -> Iterator[Snapshot]:
     """All snapshots of all lives, life by life in order of time.
 
     Classes are dealt to units in turn, in an order drawn anew for each round, so that no number
@@ -69,15 +62,15 @@ def snapshots(config: Configuration) -> Iterator[Snapshot]:
     ------
     ConfigError    for a plan that lives cannot follow, and classes that do not grow
     """
-    seed, names = config.seed, list(config["plan"]["classes"])
-    options = read_life(config["life"])
-    n_units = _checked_units(config, options)
-    machine = read_machine(config)
-    points = _setpoints(config, options, n_units)
+    seed, names, options = reader.seed, reader.plan.classes, reader.life
+    _refuse_counts(reader)
+    n_units = reader.plan.n_units
+    machine = reader.machine()
+    points = _setpoints(reader)
     n_setpoints = len(points) // n_units
     speed, torque = _speed_and_torque(machine, points, n_units)
-    faults = draw_class_faults(config, np.arange(n_units))
-    gears = LifeGears(config, machine, corners(speed, torque))
+    faults = draw_class_faults(reader, np.arange(n_units))
+    gears = LifeGears(reader, machine, corners(speed, torque))
     number = 0
     for unit in range(n_units):
         order = stream(seed, Stream.ORDER, unit // len(names)).permutation(len(names))
@@ -103,7 +96,7 @@ def snapshots(config: Configuration) -> Iterator[Snapshot]:
             values = dict(points[point])
             for key, drift in options.drift.items():
                 factor = drift.factor(running, factors[key])
-                values[key] = _number(config, key, values) * factor
+                values[key] = reader.number(key) * factor
             yield Snapshot(
                 unit=unit,
                 label=label,
@@ -189,25 +182,26 @@ def _life(
     return _Life(fault=fault, law=unit.law, loads=unit.loads, course=course)
 
 
-def _checked_units(config: Configuration, options: LifeOptions) -> int:
-    """Number of lives; refuses what a plan of lives does not ask."""
-    plan = config["plan"]
+def _refuse_counts(reader: InputReader) -> None:
+    """Raise ConfigError for what a plan of lives does not ask."""
+    plan, options = reader.plan, reader.life
     for key in ("n_records", "conditions_per_unit"):
-        if plan[key] is not None:
+        value = getattr(plan, key)
+        if value is not None:
             raise ConfigError(
-                f"plan.{key} = {plan[key]!r}: lives and their snapshots say how many records "
+                f"plan.{key} = {value!r}: lives and their snapshots say how many records "
                 "there are; leave it null"
             )
-    if plan["n_repeats"] != 1 or plan["design"] == GRID:
+    if plan.n_repeats != 1 or plan.is_grid:
         raise ConfigError(
             "a plan of lives has plan.n_repeats=1 and draws its set-points: plan.design is no grid"
         )
-    if plan.get("n_reference"):
+    if plan.n_reference:
         raise ConfigError(
-            f"plan.n_reference = {plan['n_reference']!r}: lives have no reference records; a "
+            f"plan.n_reference = {plan.n_reference!r}: lives have no reference records; a "
             "machine is new at its first snapshot: give 0"
         )
-    for name, fault in config["classes"].items():
+    for name, fault in reader.classes.items():
         kinds = {part["kind"] for part in fault_parts(fault)}
         if kinds - options.laws.keys() or len(fault_parts(fault)) > 1:
             grown = ", ".join(("healthy", *options.laws))
@@ -215,35 +209,33 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
                 f"plan.classes: nothing makes {name} grow; this life has {grown}: take "
                 "life=mixed, or other classes"
             )
-    _refuse_designs(config, options)
+    _refuse_designs(reader)
     for key in options.drift:
-        config.with_values({key: 0.0})  # refuses keys that cannot drift
-        if key in plan["vary"] or key in (SPEED, TORQUE):
+        reader.refuse_fixed(key)
+        if key in plan.vary or key in (SPEED, TORQUE):
             raise ConfigError(
                 f"life.drift: '{key}' is drawn for each set-point already; let one of the two go"
             )
-    return whole_number("plan.n_units", plan["n_units"], at_least=1)
 
 
-def _refuse_designs(config: Configuration, options: LifeOptions) -> None:
+def _refuse_designs(reader: InputReader) -> None:
     """Raise ConfigError for gears that differ between lives or in the course of one."""
-    for key in (*config["plan"]["vary"], *options.drift):
+    for key in (*reader.plan.vary, *reader.life.drift):
         if key.startswith(GEAR_KEYS):
             raise ConfigError(
                 f"'{key}': every life has the gears of the configuration; make a set for each "
                 "design with -m"
             )
-    if draws_unit_load(config):
+    if reader.plan.draws_unit_load:
         raise ConfigError(
             f"plan.vary.{TORQUE}: of = '{UNIT_LOAD}': lives draw the torque itself; leave of out"
         )
 
 
-def _setpoints(
-    config: Configuration, options: LifeOptions, n_units: int
-) -> list[dict[str, float]]:
+def _setpoints(reader: InputReader) -> list[dict[str, float]]:
     """Values of every set-point, unit by unit."""
-    vary = read_plan_options(config).vary
+    plan, options = reader.plan, reader.life
+    vary = plan.vary
     n_setpoints, given = options.n_setpoints, None
     if options.blocks is not None:
         for key in (SPEED, TORQUE):
@@ -254,8 +246,9 @@ def _setpoints(
                 )
         given = given_history(options.blocks, options.horizon)
         n_setpoints = len(given.speed)
-    numbers = np.arange(n_units * n_setpoints)
-    drawn = draw_values(config, vary, numbers, stream(config.seed, Stream.CONDITION))
+    numbers = np.arange(plan.n_units * n_setpoints)
+    rng = stream(reader.seed, Stream.CONDITION)
+    drawn = draw_points(plan.design, vary, numbers, rng).values(vary)
     points = [{key: float(drawn[key][k]) for key in drawn} for k in numbers.tolist()]
     if given is not None:
         for k, values in enumerate(points):
@@ -284,13 +277,3 @@ def _history(
     if options.blocks is not None:
         return given_history(options.blocks, options.horizon)
     return draw_history(options.drawn, speed, torque, options.horizon, rng)
-
-
-def _number(config: Configuration, key: str, values: Mapping[str, float]) -> float:
-    """A number of the configuration as the set-point has it."""
-    if key in values:
-        return values[key]
-    node: Any = config
-    for name in key.split("."):
-        node = node[name]
-    return float(node)

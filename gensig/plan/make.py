@@ -19,13 +19,11 @@ from gensig.dataset.schema import SCALES, signal_column
 from gensig.errors import ConfigError
 from gensig.faults.base import faulty_teeth, require_size
 from gensig.faults.registry import fault_parts, read_faults
-from gensig.life.life_options import runs_to_failure
-from gensig.life.options import read_wear_options
 from gensig.mesh.pair_table import check_teeth
 from gensig.options.configuration import Configuration
 from gensig.plan.draws import (
     draw_class_faults,
-    draw_values,
+    draw_points,
     drawn_gears,
     fault_sizes,
     fault_specs,
@@ -34,14 +32,7 @@ from gensig.plan.lives import snapshots
 from gensig.plan.unit_designs import UnitDesigns, check_designs, draw_designs
 from gensig.record.gear_columns import gear_columns
 from gensig.record.inputs import MISSING, InputReader, draw_start
-from gensig.record.machines import read_machine
-from gensig.record.options import (
-    TORQUE_KEY,
-    PlanOptions,
-    draws_unit_load,
-    read_dataset_options,
-    read_plan_options,
-)
+from gensig.record.options import TORQUE_KEY, PlanOptions
 from gensig.record.simulate import signal_shapes
 from gensig.record.streams import Stream, stream
 from gensig.systems.base import Machine
@@ -90,21 +81,21 @@ def make_plan(config: Configuration) -> Plan:
     ------
     ConfigError    for counts, keys or distributions that cannot be used
     """
-    options = read_plan_options(config)
-    for key in options.vary:
-        config.with_values({key: 0.0})  # refuses keys that cannot be varied
-    if "wear" in config:  # configurations of earlier data sets have none
-        read_wear_options(config["wear"])
-    if runs_to_failure(config):
-        return _plan_of_lives(config, options)
-    check_designs(config, options)
-    seed, names = config.seed, options.classes
-    counts = read_counts(config)
     reader = InputReader(config)
-    machine = read_machine(config)
+    options = reader.plan
+    for key in options.vary:
+        reader.refuse_fixed(key)
+    if "wear" in config:  # configurations of earlier data sets have none
+        _ = reader.wear  # refused where its values make none
+    if reader.runs_to_failure:
+        return _plan_of_lives(reader)
+    check_designs(reader)
+    seed, names = reader.seed, options.classes
+    counts = count_records(reader)
+    machine = reader.machine()
     machine.check()
-    signal_shapes(config, machine)  # refuses what the machine does not tell
-    sound = [name for name in names if not fault_parts(config["classes"][name])]
+    signal_shapes(reader)  # refuses what the machine does not tell
+    sound = [name for name in names if not fault_parts(reader.classes[name])]
     if options.n_reference and not sound:
         raise ConfigError(
             f"plan.n_reference = {options.n_reference}: reference records are healthy, but no "
@@ -112,10 +103,10 @@ def make_plan(config: Configuration) -> Plan:
         )
     rng = stream(seed, Stream.CONDITION)
     vary = options.condition_vary
-    conditions = draw_values(config, vary, counts.condition_points, rng)
-    designs = draw_designs(config, min(counts.n_units, counts.n_conditions))
-    of_units = designs.configurations(config)
-    faults = draw_class_faults(config, counts.fault_points, of_units)
+    drawn_points = draw_points(options.design, vary, counts.condition_points, rng)
+    conditions = drawn_points.values(vary)
+    designs = draw_designs(reader, min(counts.n_units, counts.n_conditions))
+    faults = draw_class_faults(reader, counts.fault_points, designs.readers(reader))
     rows: list[dict[str, Any]] = []
     for condition, repeat in itertools.product(
         range(counts.n_conditions), range(counts.n_repeats)
@@ -144,30 +135,27 @@ def make_plan(config: Configuration) -> Plan:
     if options.n_reference:
         rows = [row | {IS_REFERENCE: 0} for row in rows]
         label = names.index(sound[0])
-        rows += _reference_rows(config, reader, counts, designs, label)
-    return _as_plan(config, rows)
+        rows += _reference_rows(reader, counts, designs, label)
+    return _as_plan(reader, rows)
 
 
 def _reference_rows(
-    config: Configuration,
-    reader: InputReader,
-    counts: Counts,
-    designs: UnitDesigns,
-    label: int,
+    reader: InputReader, counts: Counts, designs: UnitDesigns, label: int
 ) -> list[dict[str, Any]]:
     """Healthy records of every unit with an example, each at a condition of its own.
 
     Their conditions are drawn as those of the examples, by a stream of their own; where those are
     a grid, as a Latin hypercube. Like a healthy example, each is the twin that sets its noise.
     """
-    options = read_plan_options(config)
+    options, design = reader.plan, reader.plan.design
     n_units = min(counts.n_units, counts.n_conditions)
     numbers = np.arange(n_units * options.n_reference)
     if options.is_grid:
-        config = config.with_keys("plan", design=LATIN_HYPERCUBE)
-    rng = stream(config.seed, Stream.REFERENCE)
-    drawn = draw_values(config, options.condition_vary, numbers, rng)
-    fault = config["classes"][options.classes[label]]
+        design = LATIN_HYPERCUBE
+    rng = stream(reader.seed, Stream.REFERENCE)
+    vary = options.condition_vary
+    drawn = draw_points(design, vary, numbers, rng).values(vary)
+    fault = reader.classes[options.classes[label]]
     rows = []
     for number in numbers.tolist():
         unit, condition = number % n_units, counts.n_conditions + number
@@ -176,7 +164,7 @@ def _reference_rows(
         values = designs.of(unit, of_condition)
         machine = reader.machine(values)
         machine.pair.require_continuous_drive()
-        start = stream(config.seed, Stream.TWIN, condition)
+        start = stream(reader.seed, Stream.TWIN, condition)
         ids = _ids(options, label, unit, gearbox, specimen, condition, 0)
         row = _row(machine, fault, values, start, sham=options.sham)
         gears = _gear_columns(options, machine)
@@ -191,27 +179,26 @@ def _gear_columns(options: PlanOptions, machine: Machine) -> dict[str, int | flo
     return gear_columns(machine.pair)
 
 
-def _plan_of_lives(config: Configuration, options: PlanOptions) -> Plan:
+def _plan_of_lives(reader: InputReader) -> Plan:
     """One row a snapshot, life by life. Every unit has its own gears, as they fail only once."""
-    machine = read_machine(config)
+    options, machine = reader.plan, reader.machine()
     machine.check()
     machine.pair.require_continuous_drive()
     n_gearboxes = _count_gearboxes(options)
-    reader = InputReader(config)
     rows: list[dict[str, Any]] = []
-    for look in snapshots(config):
+    for look in snapshots(reader):
         unit, gearbox = look.unit, look.unit % n_gearboxes
         ids = _ids(options, look.label, unit, gearbox, unit, look.condition, 0)
         drawn_columns = _row(
             reader.machine(look.values),
             look.fault,
             look.values,
-            stream(config.seed, Stream.START, len(rows)),
+            stream(reader.seed, Stream.START, len(rows)),
             sham=options.sham,
             is_checked=look.is_last,
         )
         rows.append(ids | drawn_columns | look.columns)
-    return _as_plan(config, rows)
+    return _as_plan(reader, rows)
 
 
 def _ids(
@@ -255,14 +242,14 @@ def _count_gearboxes(options: PlanOptions) -> int:
     return min(options.n_units, options.n_gearboxes)
 
 
-def read_counts(config: Configuration) -> Counts:
+def count_records(reader: InputReader) -> Counts:
     """Check and work out every count of the plan; a grid's from its levels.
 
     Raises
     ------
     ConfigError    for counts that cannot be used or do not agree
     """
-    plan = read_plan_options(config)
+    plan = reader.plan
     n_classes = len(plan.classes)
     per_unit, n_faults = plan.conditions_per_unit, 1
     if plan.is_grid:
@@ -271,7 +258,7 @@ def read_counts(config: Configuration) -> Counts:
                 f"plan.conditions_per_unit = {per_unit!r}: a grid's levels say how many; leave "
                 "it null"
             )
-        per_unit, n_faults = _grid_size(config, plan)
+        per_unit, n_faults = _grid_size(reader)
     n_records = plan.n_records
     if per_unit is not None:
         n_conditions = plan.n_units * per_unit * n_faults
@@ -296,15 +283,16 @@ def read_counts(config: Configuration) -> Counts:
     )
 
 
-def _grid_size(config: Configuration, plan: PlanOptions) -> tuple[int, int]:
+def _grid_size(reader: InputReader) -> tuple[int, int]:
     """Points of the grid over the conditions, and the least common multiple of those of faults."""
+    plan = reader.plan
     for key, distribution in plan.condition_vary.items():
         if not (distribution.levels or distribution.names_levels):
             raise ConfigError(
                 f"plan.vary.{key}: a grid needs its levels: give levels: 4 or so, distribution: "
                 "choice, or levels: null to draw it all the same"
             )
-    n_faults = [_n_points(vary) for vary in _fault_varies(config).values()]
+    n_faults = [_n_points(vary) for vary in _fault_varies(reader).values()]
     return _n_points(plan.condition_vary), math.lcm(*n_faults)
 
 
@@ -312,53 +300,48 @@ def _n_points(vary: Mapping[str, Distribution]) -> int:
     return math.prod(distribution.levels or 1 for distribution in vary.values())
 
 
-def _fault_varies(config: Configuration) -> dict[str, dict[str, Distribution]]:
+def _fault_varies(reader: InputReader) -> dict[str, dict[str, Distribution]]:
     """Distributions of the keys of each class."""
     return {
-        name: fault_specs(config, fault)[0] for name, fault in config["classes"].items()
+        name: fault_specs(reader, fault)[0] for name, fault in reader.classes.items()
     }
 
 
-def describe_design(config: Configuration) -> str:
+def describe_design(reader: InputReader) -> str:
     """The design in words.
 
     Of a grid the number of levels of each key, and the keys that are drawn all the same.
     """
-    plan = read_plan_options(config)
+    plan = reader.plan
     if not plan.is_grid:
         return plan.design
     vary = plan.condition_vary
     levels = {key: distribution.levels for key, distribution in vary.items()}
     levels |= dict.fromkeys(plan.unit_vary, 0)
-    for name, vary in _fault_varies(config).items():
+    for name, vary in _fault_varies(reader).items():
         levels |= {f"{name}.{key}": vary[key].levels for key in vary}
     crossed = " x ".join(f"{key} {n}" for key, n in levels.items() if n)
     drawn = ", ".join(key for key, n in levels.items() if not n)
     return f"grid of {crossed or 'no key'}" + f"; drawn: {drawn}" * bool(drawn)
 
 
-def varied_keys(config: Configuration) -> dict[str, str]:
+def varied_keys(reader: InputReader) -> dict[str, str]:
     """Key that a plan varies -> its range in words; keys of faults begin with their class.
 
     Sizes of faults that are shares of a tooth are those of the configured gear.
     """
-    varied = {
-        key: distribution.text
-        for key, distribution in read_plan_options(config).vary.items()
-    }
-    if draws_unit_load(config):
+    varied = {key: distribution.text for key, distribution in reader.plan.vary.items()}
+    if reader.plan.draws_unit_load:
         varied[TORQUE_KEY] += " of unit load, N/mm2"
-    if runs_to_failure(config):
+    if reader.runs_to_failure:
         grown = "grows along each life"
         return varied | {
-            name: grown
-            for name, fault in config["classes"].items()
-            if fault_parts(fault)
+            name: grown for name, fault in reader.classes.items() if fault_parts(fault)
         }
-    if gears := drawn_gears(config):
+    if gears := drawn_gears(reader):
         sizes = "sizes and teeth below are of the configured gear"
         varied["fault_gear"] = f"{', '.join(gears)}; {sizes}"
-    for name, vary in _fault_varies(config).items():
+    for name, vary in _fault_varies(reader).items():
         varied |= {f"{name}.{key}": vary[key].text for key in vary}
     return varied
 
@@ -429,13 +412,13 @@ def _row(
     return row
 
 
-def _as_plan(config: Configuration, rows: list[dict[str, Any]]) -> Plan:
+def _as_plan(reader: InputReader, rows: list[dict[str, Any]]) -> Plan:
     """Rows to columns.
 
     A parameter that a record has not is NaN. The rows are emptied: nothing is held twice.
     """
     names = dict.fromkeys(itertools.chain(*rows))
-    together = records_per_shard(config, len(rows))
+    together = records_per_shard(reader, len(rows))
     shard, number = shard_rows(len(rows), together)
     columns: dict[str, Any] = {"record_id": record_ids(len(rows))}
     columns |= {"shard": shard, "row": number}
@@ -444,18 +427,18 @@ def _as_plan(config: Configuration, rows: list[dict[str, Any]]) -> Plan:
     return Plan(columns=columns)
 
 
-def records_per_shard(config: Configuration, n_records: int) -> int:
+def records_per_shard(reader: InputReader, n_records: int) -> int:
     """Number of records of a shard, as configured or for a set of ``n_records``.
 
     Where it is not configured, it grows with the set: 24 up to 24,000 records, then as many as
     make 1,000 shards. The samples of a shard take at most 500 MB.
     """
-    given = read_dataset_options(config).records_per_shard
+    given = reader.dataset.records_per_shard
     if given is not None:
         return given
     groups = math.ceil(n_records / (MOST_SHARDS * LANES))
     wanted = max(LEAST_IN_SHARD, groups * LANES)
-    fitting = MOST_SHARD_BYTES // record_bytes(config)
+    fitting = MOST_SHARD_BYTES // record_bytes(reader)
     if wanted <= fitting:
         return wanted
     if fitting < LANES:
@@ -463,15 +446,15 @@ def records_per_shard(config: Configuration, n_records: int) -> int:
     return fitting // LANES * LANES
 
 
-def record_bytes(config: Configuration, *, as_stored: bool = False) -> int:
+def record_bytes(reader: InputReader, *, as_stored: bool = False) -> int:
     """Bytes of one record's samples in single precision.
 
     ``as_stored`` they are in the chosen type, before compression. Shards are cut by the former,
     so that the chosen type does not change a plan.
     """
-    shapes = signal_shapes(config, read_machine(config))
+    shapes = signal_shapes(reader)
     counts = set()
-    if as_stored and read_dataset_options(config).sample_type == "int16":
+    if as_stored and reader.dataset.sample_type == "int16":
         counts = set(SCALES)
     n_bytes = 0
     for name, shape in shapes.items():

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from gensig.dataset.distributions import GRID
 from gensig.dataset.plan import Plan
 from gensig.dataset.splitting.protocols import why_left_out
-from gensig.life.life_options import runs_to_failure
-from gensig.options.configuration import Configuration
+from gensig.record.inputs import InputReader
 
 BY_MACHINE = {
     "by_unit": "machine",
@@ -18,36 +16,37 @@ BY_MACHINE = {
 MOST_OF_A_MACHINE, ADVISED_OF_A_MACHINE = 40, 4
 
 
-def plan_notes(config: Configuration, plan: Plan) -> list[str]:
+def plan_notes(reader: InputReader, plan: Plan) -> list[str]:
     """At most one line: machines without records or with many, and splits that are not possible."""
     examples = plan.examples()
     parts = (
-        _units_left_out(config, examples),
-        _few_machines(config, examples),
-        _splits_left_out(examples, config.seed),
+        _units_left_out(reader, examples),
+        _few_machines(reader, examples),
+        _splits_left_out(examples, reader.seed),
     )
     note = "; ".join(filter(None, parts))
     return [note] * bool(note)
 
 
-def _units_left_out(config: Configuration, plan: Plan) -> str:
-    asked, used = config["plan"]["n_units"], n_different(plan, "unit_id")
-    if used >= asked or runs_to_failure(config):
+def _units_left_out(reader: InputReader, plan: Plan) -> str:
+    options = reader.plan
+    asked, used = options.n_units, n_different(plan, "unit_id")
+    if used >= asked or reader.runs_to_failure:
         return ""
     conditions = _count(n_different(plan, "condition_id"), "condition")
-    classes = _count(len(config["plan"]["classes"]), "class", "es")
-    repeats = _count(config["plan"]["n_repeats"], "repeat")
+    classes = _count(len(options.classes), "class", "es")
+    repeats = _count(options.n_repeats, "repeat")
     records = _count(plan.n_records, "record")
     counts = f"{records} are {conditions} of {classes} and {repeats}"
     return f"{counts}: {used} of {asked} machines are used"
 
 
-def _few_machines(config: Configuration, plan: Plan) -> str:
+def _few_machines(reader: InputReader, plan: Plan) -> str:
     """Note on many records of few machines, where the number of machines is free."""
-    options, machines = config["plan"], n_different(plan, "unit_id")
-    given = options["conditions_per_unit"] is not None or options["design"] == GRID
+    options, machines = reader.plan, n_different(plan, "unit_id")
+    given = options.conditions_per_unit is not None or options.is_grid
     each = plan.n_records / machines
-    if given or each <= MOST_OF_A_MACHINE or runs_to_failure(config):
+    if given or each <= MOST_OF_A_MACHINE or reader.runs_to_failure:
         return ""
     counts = f"{_count(plan.n_records, 'record')} of {_count(machines, 'machine')}"
     more = plan.n_records // ADVISED_OF_A_MACHINE

@@ -8,25 +8,16 @@ from dataclasses import dataclass
 from gensig.errors import ConfigError, GeometryError
 from gensig.geometry.contact import GearPair
 from gensig.mesh.modification import sound_teeth
-from gensig.options.configuration import Configuration
+from gensig.record.inputs import InputReader
 from gensig.record.options import (
     CROSSED,
     GEAR_KEYS,
     SEPARATE,
     TORQUE_KEY,
     UNIT_LOAD,
-    PlanOptions,
-    draws_unit_load,
-    read_plan_options,
 )
 from gensig.record.streams import Stream, stream
-from gensig.systems.registry import (
-    LINE,
-    SLICED,
-    read_gear_group,
-    read_modification,
-    read_pair,
-)
+from gensig.systems.registry import SLICED
 
 MOST_DRAWS = 100  # of one unit, until its gears can be made
 
@@ -54,15 +45,12 @@ class UnitDesigns:
             values[TORQUE_KEY] *= self.torques[design]
         return values
 
-    def configurations(self, config: Configuration) -> list[Configuration]:
-        """Configurations of the designs, with the sizes of their gears."""
-        drawn = [config.with_values(values) for values in self.values]
-        if len(drawn) == 1:
-            return drawn
-        return [each.with_entries(gear=read_gear_group(each)) for each in drawn]
+    def readers(self, reader: InputReader) -> list[InputReader]:
+        """Readers of the designs, with the sizes of their gears."""
+        return [reader.with_values(values) for values in self.values]
 
 
-def draw_designs(config: Configuration, n_units: int) -> UnitDesigns:
+def draw_designs(reader: InputReader, n_units: int) -> UnitDesigns:
     """Draw the design of every unit, each from a stream of its own.
 
     A unit whose gears cannot be made or cannot mesh is drawn again from its stream.
@@ -71,21 +59,20 @@ def draw_designs(config: Configuration, n_units: int) -> UnitDesigns:
     ------
     ConfigError    for a unit whose gears can never be made
     """
-    options = read_plan_options(config)
     values: tuple[Mapping[str, float], ...] = ({},)
-    if options.varies_gears:
-        values = tuple(_draw_design(config, options, unit) for unit in range(n_units))
+    if reader.plan.varies_gears:
+        values = tuple(_draw_design(reader, unit) for unit in range(n_units))
     torques: tuple[float, ...] = ()
-    if draws_unit_load(config):
-        pairs = (read_pair(config.with_values(design)) for design in values)
-        torques = tuple(unit_load_torque(pair) for pair in pairs)
+    if reader.plan.draws_unit_load:
+        readers = (reader.with_values(design) for design in values)
+        torques = tuple(unit_load_torque(each.parts.pair) for each in readers)
     return UnitDesigns(values=values, torques=torques)
 
 
-def check_designs(config: Configuration, options: PlanOptions) -> None:
+def check_designs(reader: InputReader) -> None:
     """Raise ConfigError for plans whose gears cannot differ, or have no unit load."""
-    kind = config["system"]["kind"]
-    if kind == LINE and draws_unit_load(config):
+    options = reader.plan
+    if reader.is_line and options.draws_unit_load:
         raise ConfigError(
             f"plan.vary.{TORQUE_KEY}: of = '{UNIT_LOAD}' is the load of one gear pair, and a "
             "drive line has several; draw the torque itself"
@@ -98,34 +85,31 @@ def check_designs(config: Configuration, options: PlanOptions) -> None:
             f"plan.vary: '{key}' is drawn once a machine, but with plan.machines={CROSSED} "
             f"machines share their gears; give plan.machines={SEPARATE}, or several sets with -m"
         )
-    if kind == LINE:
+    if reader.is_line:
         raise ConfigError(
             f"plan.vary: '{key}': a drive line has its gears from tables; take "
             "system=spur_pair or helical_pair, or make a set for each table"
         )
-    if kind == SLICED and config["dataset"]["store_mesh_state"]:
+    if reader.system_kind == SLICED and reader.dataset.store_mesh_state:
         raise ConfigError(
             f"plan.vary: '{key}': the arrays of dataset.store_mesh_state differ with the gears "
             f"of system={SLICED}; give dataset.store_mesh_state=false, or take system=spur_pair"
         )
 
 
-def _draw_design(
-    config: Configuration, options: PlanOptions, unit: int
-) -> dict[str, float]:
+def _draw_design(reader: InputReader, unit: int) -> dict[str, float]:
     """Values of the first design of a unit's stream that can be made."""
-    rng = stream(config.seed, Stream.GEAR_DESIGN, unit)
+    rng = stream(reader.seed, Stream.GEAR_DESIGN, unit)
     reason = ""
     for _ in range(MOST_DRAWS):
         values = {
             key: distribution.values_at(rng.random(1))[0]
-            for key, distribution in options.unit_vary.items()
+            for key, distribution in reader.plan.unit_vary.items()
         }
-        drawn = config.with_values(values)
         try:
-            pair = read_pair(drawn)
-            pair.require_continuous_drive()
-            sound_teeth(pair, read_modification(drawn))
+            parts = reader.with_values(values).parts
+            parts.pair.require_continuous_drive()
+            sound_teeth(parts.pair, parts.modification)
         except GeometryError as error:
             reason = str(error)
         else:

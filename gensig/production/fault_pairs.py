@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.registry import FAULTS, fault_parts, without_vary
-from gensig.options.configuration import Configuration, whole_number
+from gensig.options.configuration import Configuration, Section, whole_number
 from gensig.plan.condition_courses import SEED_KEY, settle_courses
 from gensig.plan.make import make_plan
 from gensig.production.streaming import epoch_seed
@@ -25,7 +25,7 @@ from gensig.record.inputs import (
     draw_start,
     simulate_motions,
 )
-from gensig.record.options import AS_GIVEN, CROSSED, read_plan_options
+from gensig.record.options import AS_GIVEN, CROSSED
 from gensig.record.streams import Stream, stream
 from gensig.sensing.instrument import Instrument
 from gensig.sensing.options import read_sensing
@@ -117,7 +117,7 @@ class FaultPairs:
     def cell(self, index: int) -> PairCell:
         """Simulate one cell; cells are numbered speed by speed, torques fastest."""
         rows = self.rows[index * self.n_units : (index + 1) * self.n_units]
-        sound, faulty = _contrasts(self.config, rows)
+        sound, faulty = _contrasts(InputReader(self.config), rows)
         motions = simulate_motions([*sound, *faulty])
         n_samples = round(self.duration * self.sampling_rate)
         shape = (self.n_units, len(self.channel_names), n_samples)
@@ -182,14 +182,14 @@ def make_pairs(
     ConfigError    for a machine without fault or noise, and for numbers that cannot be used
     """
     config = config.with_entries(seed=epoch_seed(config.seed, epoch))
-    _check_fault_and_noise(config)
-    fault = config["fault"]
+    fault, operating = config["fault"], config["operating"]
+    _check_fault_and_noise(fault, config["sensing"])
     whole_number("the number of machines", n_units, at_least=FEWEST_UNITS)
     speeds = _levels(
-        "speeds in r/min", speeds_rpm, config["operating"]["speed_rpm"], SPEED_SHARES
+        "speeds in r/min", speeds_rpm, operating["speed_rpm"], SPEED_SHARES
     )
     torques = _levels(
-        "torques in N m", torques_nm, config["operating"]["torque_nm"], TORQUE_SHARES
+        "torques in N m", torques_nm, operating["torque_nm"], TORQUE_SHARES
     )
     if len(speeds) * len(torques) > MOST_CELLS:
         raise ConfigError(
@@ -199,17 +199,18 @@ def make_pairs(
     fixed = without_vary(fault)
     config = config.with_entries(fault=fixed, classes={fault["kind"]: fixed})
     config = config.with_keys("dataset", store_mesh_state=False)
-    planned, rows = _planned(config, speeds, torques, n_units)
-    system = read_system(planned)
+    reader, rows = _planned(config, speeds, torques, n_units)
+    system = read_system(reader.config)
     teeth = {"pinion": system.pair.pinion.n_teeth, "wheel": system.pair.wheel.n_teeth}
     faulted = dict.fromkeys(str(part["gear"]) for part in fault_parts(fault))
     shape = power = None
     if not system.sensing.has_white_noise:
-        shape = _noise_shape(planned, rows[:n_units])
+        shape = _noise_shape(reader, rows[:n_units])
     if fixed_noise:
-        power = _power_at_set_point(config, n_units)
+        point = [operating["speed_rpm"]], [operating["torque_nm"]]
+        power = _power_of_units(*_planned(config, *point, n_units))
     return FaultPairs(
-        config=planned,
+        config=reader.config,
         speeds_rpm=speeds,
         torques_nm=torques,
         n_units=n_units,
@@ -224,16 +225,15 @@ def make_pairs(
     )
 
 
-def _check_fault_and_noise(config: Configuration) -> None:
+def _check_fault_and_noise(fault: Section, sensing: Section) -> None:
     """Raise ConfigError for a machine without a fault, or without noise of the healthy twin."""
-    fault, sensing = config["fault"], config["sensing"]
     if not fault_parts(fault):
         raise ConfigError(
             f"fault={fault['kind']}: there is nothing to find; "
             "choose a fault, for instance fault=crack "
             "(plan.sham=true leaves it out as a control)"
         )
-    if not read_sensing(config.section("sensing")).has_noise:
+    if not read_sensing(sensing).has_noise:
         raise ConfigError(
             "sensing.snr_db = null: without noise every fault is seen; "
             "give a signal-to-noise ratio in dB, or sensing.noise.level_m_per_s2"
@@ -264,9 +264,9 @@ def _planned(
     speeds: Sequence[float],
     torques: Sequence[float],
     n_units: int,
-) -> tuple[Configuration, list[dict[str, Any]]]:
-    """The configuration with a plan of one row for each cell and unit, and those rows."""
-    plan = read_plan_options(config)
+) -> tuple[InputReader, list[dict[str, Any]]]:
+    """The reader of a plan of one row for each cell and unit, and those rows."""
+    plan = InputReader(config).plan
     n_gearboxes = plan.n_gearboxes
     if n_gearboxes is None:
         n_gearboxes = n_units
@@ -293,18 +293,17 @@ def _planned(
     for index in range(table.n_records):
         gearbox = f"gearbox-{index % n_units % n_gearboxes:04d}"
         rows.append({**table.record(index), "gearbox_id": gearbox})
-    return config, rows
+    return InputReader(config), rows
 
 
 def _contrasts(
-    config: Configuration, rows: Sequence[Row]
+    reader: InputReader, rows: Sequence[Row]
 ) -> tuple[list[RecordInputs], list[RecordInputs]]:
     """Inputs of each row without and with its fault.
 
     Both begin as the healthy twin that sets the noise of a data set. Nuisances and noise are
     those of the row.
     """
-    reader = InputReader(config)
     inputs = [reader.inputs(row) for row in rows]
     starts = [draw_start(each.machine, each.stream(Stream.TWIN)) for each in inputs]
     faulty = [
@@ -320,13 +319,9 @@ def _noise_power(inputs: RecordInputs, sound: CleanRecord) -> Array:
     return sensing.noise_power(reference, n_samples)
 
 
-def _power_at_set_point(config: Configuration, n_units: int) -> Array:
-    """Noise power of every unit at the configured speed and torque, (unit, channel)."""
-    operating = config["operating"]
-    planned, rows = _planned(
-        config, [operating["speed_rpm"]], [operating["torque_nm"]], n_units
-    )
-    sound, _ = _contrasts(planned, rows)
+def _power_of_units(reader: InputReader, rows: Sequence[Row]) -> Array:
+    """Noise power of every unit's record, (unit, channel)."""
+    sound, _ = _contrasts(reader, rows)
     powers = []
     for inputs, motion in zip(sound, simulate_motions(sound), strict=True):
         if isinstance(motion, SimulationError):
@@ -335,12 +330,11 @@ def _power_at_set_point(config: Configuration, n_units: int) -> Array:
     return np.stack(powers)
 
 
-def _noise_shape(config: Configuration, rows: Sequence[Row]) -> Array:
+def _noise_shape(reader: InputReader, rows: Sequence[Row]) -> Array:
     """Density of each unit's noise at power 1, averaged over draws and bins.
 
     Shape (unit, channel, bin).
     """
-    reader = InputReader(config)
     densities = []
     for unit, row in enumerate(rows):
         inputs = reader.inputs(row)
@@ -352,7 +346,7 @@ def _noise_shape(config: Configuration, rows: Sequence[Row]) -> Array:
             path=inputs.instrument.path,
             sensors=None,
         )
-        children = stream(config.seed, Stream.NOISE, unit).spawn(NOISE_DRAWS)
+        children = stream(reader.seed, Stream.NOISE, unit).spawn(NOISE_DRAWS)
         noises = (
             ideal.record(silent, np.ones(len(silent)), rng)[0] for rng in children
         )

@@ -14,6 +14,7 @@ from gensig.dataset.folder.failures import commonest, failure_reasons
 from gensig.dataset.folder.joining import agreed_folder, joined_folder
 from gensig.dataset.folder.layout import (
     SHARDS,
+    ConfigContent,
     Manifest,
     ShardEntry,
     read_manifest,
@@ -49,9 +50,7 @@ from gensig.production.run_check import (
     shard_entries,
 )
 from gensig.production.shard_writing import WrittenShard
-from gensig.record.options import (
-    read_dataset_options,
-)
+from gensig.record.inputs import InputReader
 from gensig.terminal.run_progress import Progress
 from gensig.version import __version__
 
@@ -66,7 +65,7 @@ def begin_folder(config: Configuration, overrides: Sequence[str], out: Path) -> 
             raise ConfigError(
                 f"dataset.{key} = {config['dataset'][key]!r}; allowed: {', '.join(allowed)}"
             )
-    dataset = read_dataset_options(config)
+    dataset = InputReader(config).dataset
     creation_options(dataset.compression)  # refuses one whose package is missing
     plan = make_plan(config)
     recorded = config.with_entries(out=None).plain()
@@ -111,7 +110,7 @@ def run_folder(
     *,
     executor: Executor,
     on_shard: Callable[[Progress], None],
-    asked: Configuration | None = None,
+    asked: ConfigContent | None = None,
     counts: RecordCounts | None = None,
     maker: Maker = SIMULATION,
 ) -> tuple[int, list[str]]:
@@ -124,7 +123,7 @@ def run_folder(
     executor : where the shards are made; it decides no bit
     on_shard : called at the beginning, and for every shard that is finished or could not be made
     counts : takes the records of shards at work
-    asked : a configuration that must agree with the folder's in all that decides bits
+    asked : a configuration, plain, that must agree with the folder's in all that decides bits
     maker : of the plan and the shards that are missing
 
     Returns
@@ -139,16 +138,13 @@ def run_folder(
 
 
 def _join(
-    out: Path, asked: Configuration | None, maker: Maker, *, closes: bool
+    out: Path, asked: ConfigContent | None, maker: Maker, *, closes: bool
 ) -> None:
     """Refuse a folder of another version or configuration; restore lost tables of one to close."""
-    plain = None
-    if asked is not None:
-        plain = asked.plain()
     if closes:
-        manifest, config = agreed_folder(out, asked=plain)
+        manifest, config = agreed_folder(out, asked=asked)
         restore_tables(out, manifest, lambda: maker.plan(out, config))
-    joined_folder(out, asked=plain)
+    joined_folder(out, asked=asked)
     if closes:
         collect_receipts(out)
         manifest = read_manifest(out)

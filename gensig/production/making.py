@@ -18,6 +18,7 @@ from gensig.plan.doubts import plan_doubts
 from gensig.plan.request import Request, read_request
 from gensig.production.folder import begin_folder, run_folder
 from gensig.production.record_counts import record_counts
+from gensig.record.inputs import InputReader
 from gensig.terminal.run_progress import RunProgress
 
 
@@ -37,7 +38,7 @@ def make_folder(
         joined_folder(out, asked=request.config.with_entries(out=None).plain())
     else:
         plan = begin_folder(request.config, request.overrides, out)
-        for text in plan_doubts(request.config, plan):
+        for text in plan_doubts(InputReader(request.config), plan):
             warnings.warn(text, stacklevel=3)
     manifest = read_manifest(out)
     if manifest.is_complete and not absences(out, manifest):

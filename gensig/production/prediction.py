@@ -15,10 +15,11 @@ import numpy as np
 from gensig.dataset.folder.failures import commonest
 from gensig.dataset.plan import Plan, plan_text
 from gensig.execution.base import read_n_workers
-from gensig.options.configuration import Configuration
+from gensig.options.configuration import Section
 from gensig.plan.make import describe_design, make_plan, varied_keys
 from gensig.plan.notes import n_different
 from gensig.production.shard_writing import block_length, open_shard
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import Record, forget_twins, simulate_records
 from gensig.text.amounts import duration_text, size_text
 
@@ -38,7 +39,7 @@ class FailedRecordsWarning(UserWarning):
 
 
 def predict(
-    config: Configuration,
+    reader: InputReader,
     *,
     on_plan: Callable[[Plan, int], None] = lambda _plan, _n_timed: None,
 ) -> dict[str, str]:
@@ -54,22 +55,22 @@ def predict(
     """
     started = time.process_time()  # what a process spends before its first record
     begin = time.monotonic()
-    table = make_plan(config)
+    table = make_plan(reader.config)
     planning = time.monotonic() - begin
-    first = table.rows(0)[: block_length(config)]
+    first = table.rows(0)[: block_length(reader.machine())]
     probe = [table.record(int(index)) for index in first]
     on_plan(table, len(probe))
     begin = time.monotonic()
-    simulate_records(config, probe[:1])  # compiles, or loads what was compiled
-    workers = min(_n_processes(config), table.n_shards)
+    simulate_records(reader, probe[:1])  # compiles, or loads what was compiled
+    workers = min(_n_processes(reader.config["executor"]), table.n_shards)
     # Workers import once more what this process has imported, and load what was compiled.
     n_imports = min(workers, 2)
     start_up = planning + started * n_imports + time.monotonic() - begin
     forget_twins()
     begin = time.monotonic()
-    records = simulate_records(config, probe)
+    records = simulate_records(reader, probe)
     _warn_of_failed(records)
-    n_bytes = _stored_bytes(config, table, records)
+    n_bytes = _stored_bytes(reader, table, records)
     seconds = time.monotonic() - begin
     rounds: float = math.ceil(table.n_shards / workers)
     whole = seconds * max(table.shard_sizes()) / len(probe)
@@ -87,9 +88,9 @@ def predict(
         "gears": f"{n_different(table, 'specimen_id'):,} set(s)",
         "gearboxes": f"{n_different(table, 'gearbox_id'):,}",
         "conditions": f"{n_different(examples, 'condition_id'):,}",
-        "design": describe_design(config),
-        "repeats": f"{config['plan']['n_repeats']}",
-        "varies": _varied(config),
+        "design": describe_design(reader),
+        "repeats": f"{reader.plan.n_repeats}",
+        "varies": _varied(reader),
         "shards": f"{table.n_shards} of at most {max(table.shard_sizes())} records",
         "bytes": f"{n_bytes:,} ({size_text(n_bytes)})",
         "time": f"about {duration_text(total)} on {workers} worker(s), "
@@ -97,9 +98,9 @@ def predict(
     }
 
 
-def _varied(config: Configuration) -> str:
+def _varied(reader: InputReader) -> str:
     """Varied keys with their ranges, a line each."""
-    varied = varied_keys(config)
+    varied = varied_keys(reader)
     if not varied:
         return "no key; records differ in start, noise and, by machine, in their errors"
     width = max(map(len, varied))
@@ -132,14 +133,12 @@ def _warn_of_failed(records: Sequence[Record]) -> None:
         )
 
 
-def _n_processes(config: Configuration) -> int:
+def _n_processes(executor: Section) -> int:
     """Shards made at a time, also where the rest of ``executor`` is not known yet."""
-    return read_n_workers(config["executor"]["n_workers"]) * (
-        config["executor"].get("shard_count") or 1
-    )
+    return read_n_workers(executor["n_workers"]) * (executor.get("shard_count") or 1)
 
 
-def _stored_bytes(config: Configuration, table: Plan, records: list[Record]) -> int:
+def _stored_bytes(reader: InputReader, table: Plan, records: list[Record]) -> int:
     """Bytes of all files, from two shards of different length and usual sizes of the others."""
     params = [
         name.removeprefix("params/")
@@ -149,7 +148,7 @@ def _stored_bytes(config: Configuration, table: Plan, records: list[Record]) -> 
     sizes = []
     with tempfile.TemporaryDirectory() as folder:
         for n in (1, len(records)):
-            with open_shard(Path(folder) / f"{n}.h5", config, n, params) as writer:
+            with open_shard(Path(folder) / f"{n}.h5", reader, n, params) as writer:
                 for row, record in enumerate(records[:n]):
                     writer.write(row, record.signals, record.values)
             sizes.append(writer.n_bytes)
@@ -158,7 +157,7 @@ def _stored_bytes(config: Configuration, table: Plan, records: list[Record]) -> 
     if len(records) > 1:
         per_record = (many - single) / (len(records) - 1)
     shards = table.n_shards * (single - per_record) + table.n_records * per_record
-    n_classes = len(config["plan"]["classes"])
+    n_classes = len(reader.plan.classes)
     other = (
         OTHER_BYTES
         + BYTES_PER_SHARD * table.n_shards

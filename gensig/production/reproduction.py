@@ -69,7 +69,7 @@ def reproduce(folder: Path, records: int | Sequence[str]) -> Reproduction:
     DatasetError    for a folder of another version of gensig, changed, or not finished
     ConfigError     for a record that the set does not have
     """
-    manifest, config, plan = _finished(folder)
+    manifest, reader, plan = _finished(folder)
     chosen = _chosen(folder, plan, records)
     here = environment()
     recorded = {name: str(manifest.environment.get(name, "")) for name in DECIDING}
@@ -82,7 +82,7 @@ def reproduce(folder: Path, records: int | Sequence[str]) -> Reproduction:
     refused, n_failed = 0, 0
     for start in range(0, len(chosen), BLOCK):
         rows = [plan.record(int(index)) for index in chosen[start : start + BLOCK]]
-        for row, record in zip(rows, simulate_records(config, rows), strict=True):
+        for row, record in zip(rows, simulate_records(reader, rows), strict=True):
             difference, count = _difference(folder, row, record)
             n_failed += difference == 0.0 and record.values.get("status") == "failed"
             if difference > 0.0:
@@ -100,10 +100,10 @@ def reproduce(folder: Path, records: int | Sequence[str]) -> Reproduction:
     )
 
 
-def recorded_row(folder: Path, record: str) -> tuple[Configuration, dict[str, Any]]:
-    """Configuration of a data set and the row of one record, by its number or its id."""
-    _, config, plan = _finished(folder)
-    return config, plan.record(_position(folder, plan, record, flag="--record"))
+def recorded_row(folder: Path, record: str) -> tuple[InputReader, dict[str, Any]]:
+    """Reader of a data set and the row of one record, by its number or its id."""
+    _, reader, plan = _finished(folder)
+    return reader, plan.record(_position(folder, plan, record, flag="--record"))
 
 
 def _chosen(
@@ -133,7 +133,7 @@ def _position(folder: Path, plan: Plan, record: str, *, flag: str) -> int:
     )
 
 
-def simulate_twin(config: Configuration, row: Mapping[str, Any]) -> Record:
+def simulate_twin(reader: InputReader, row: Mapping[str, Any]) -> Record:
     """The record without its faults: same unit, condition, start and noise, severity zero.
 
     The original less its twin is the residual of the fault, exact but for the rounding of stored
@@ -143,8 +143,8 @@ def simulate_twin(config: Configuration, row: Mapping[str, Any]) -> Record:
     ------
     SimulationError    where the original or the twin does not stay finite
     """
-    original = simulate_record(config, row)
-    sham = config.with_keys("plan", sham=True)
+    original = simulate_record(reader, row)
+    sham = InputReader(reader.config.with_keys("plan", sham=True))
     twin = simulate_record(sham, row)
     for record in (original, twin):
         if record.values.get("status") == "failed":
@@ -160,7 +160,7 @@ def simulate_twin(config: Configuration, row: Mapping[str, Any]) -> Record:
     }
     if not np.array_equal(signals["noise_power"], original.signals["noise_power"]):
         # noise follows the record, so that the twin alone would have another
-        inputs = InputReader(sham).inputs(row)
+        inputs = sham.inputs(row)
         (healthy,) = simulate_motions([inputs])
         if isinstance(healthy, SimulationError):
             raise healthy
@@ -173,14 +173,14 @@ def simulate_twin(config: Configuration, row: Mapping[str, Any]) -> Record:
     return Record(signals=signals, values={**twin.values, **sound})
 
 
-def _finished(folder: Path) -> tuple[Manifest, Configuration, Plan]:
+def _finished(folder: Path) -> tuple[Manifest, InputReader, Plan]:
     manifest, config = joined_folder(folder)
     refuse_implants(folder, config)
     if not manifest.is_complete:
         raise DatasetError(
             f"{folder} is incomplete; run `gensig resume {folder}` first"
         )
-    return manifest, Configuration(config), read_plan(folder / PLAN)
+    return manifest, InputReader(Configuration(config)), read_plan(folder / PLAN)
 
 
 def _difference(

@@ -30,16 +30,11 @@ from gensig.dynamics.backends.registry import IMPLICIT_BACKEND
 from gensig.dynamics.decimation import usable_band
 from gensig.dynamics.integrator import records_together
 from gensig.errors import DatasetError
-from gensig.life.life_options import runs_to_failure
 from gensig.options.configuration import Configuration
 from gensig.production.record_counts import RecordCounts
 from gensig.record.gear_columns import gear_columns
-from gensig.record.machines import read_machine
-from gensig.record.options import (
-    DatasetOptions,
-    read_dataset_options,
-    read_plan_options,
-)
+from gensig.record.inputs import InputReader
+from gensig.record.options import DatasetOptions
 from gensig.record.simulate import finished_records, signal_shapes
 from gensig.systems.base import Machine
 from gensig.units import channel_unit
@@ -72,7 +67,7 @@ def write_shard(
     ------
     DatasetError    where the folder was begun by another version than that of this process
     """
-    config, plan, manifest = _folder_inputs(out, same_file(out / PLAN))
+    reader, plan, manifest = _folder_inputs(out, same_file(out / PLAN))
     sizes = [entry.rows for entry in manifest.shards]
     n_records, begin = sizes[shard_index], sum(sizes[:shard_index])
     params = [
@@ -82,18 +77,18 @@ def write_shard(
     ]
     writer = open_shard(
         shard_path(out, shard_index),
-        config,
+        reader,
         n_records,
         params,
         identity=manifest.identity,
         shard_index=shard_index,
     )
-    together = block_length(config)
+    together = block_length(reader.machine())
     with writer, _compilation_told(counts, shard_index):
         for first in range(0, n_records, together):
             rows = plan.records(begin + first, min(together, n_records - first))
             _check_rows(out, rows, shard_index, first)
-            for row, record in enumerate(finished_records(config, rows), start=first):
+            for row, record in enumerate(finished_records(reader, rows), start=first):
                 writer.write(row, record.signals, record.values)
                 if counts is not None:
                     counts.set(shard_index, row + 1)
@@ -125,11 +120,11 @@ def _compilation_told(counts: RecordCounts | None, shard: int) -> Iterator[None]
 @functools.lru_cache(maxsize=1)
 def _folder_inputs(
     out: Path, _changed: tuple[int, ...]
-) -> tuple[Configuration, PlanRows, Manifest]:
-    """Configuration, plan and manifest at its beginning, read once for many shards of a folder."""
+) -> tuple[InputReader, PlanRows, Manifest]:
+    """Reader, plan and manifest at its beginning, made once for many shards of a folder."""
     manifest, config = joined_folder(out)
     refuse_implants(out, config)
-    return Configuration(config), PlanRows(out / PLAN), manifest
+    return InputReader(Configuration(config)), PlanRows(out / PLAN), manifest
 
 
 def _check_rows(
@@ -145,9 +140,8 @@ def _check_rows(
         )
 
 
-def block_length(config: Configuration) -> int:
+def block_length(system: Machine) -> int:
     """Records that are simulated at a time: enough for full speed, few enough for the memory."""
-    system = read_machine(config)
     n_bytes = (
         8
         * len(system.sensing.channels)
@@ -161,7 +155,7 @@ def block_length(config: Configuration) -> int:
 
 def open_shard(
     path: Path,
-    config: Configuration,
+    reader: InputReader,
     n_records: int,
     params: Sequence[str],
     *,
@@ -173,26 +167,25 @@ def open_shard(
     Parameters
     ----------
     path : file of the shard
-    config : decides signals, columns and attributes
+    reader : decides signals, columns and attributes
     n_records : rows of the shard
     params : names of the columns ``params/<name>``
     identity, shard_index : data set and number of the shard; None for records of no data set
     """
-    system, dataset = read_machine(config), read_dataset_options(config)
-    plan = read_plan_options(config)
-    attributes = root_attributes(config, system)
+    dataset, plan = reader.dataset, reader.plan
+    attributes = root_attributes(reader)
     if identity is not None:
         attributes[IDENTITY] = identity
     return ShardWriter(
         path,
         n_records=n_records,
-        signals=signal_shapes(config, system),
+        signals=signal_shapes(reader),
         params=params,
         attributes=attributes,
         shard_index=shard_index,
         compression=dataset.compression,
         sample_type=dataset.sample_type,
-        lives=runs_to_failure(config),
+        lives=reader.runs_to_failure,
         references=plan.n_reference > 0,
         gears=plan.varies_gears,
     )
@@ -227,10 +220,11 @@ def _gears_of_line(system: Machine) -> dict[str, Any]:
     }
 
 
-def root_attributes(config: Configuration, system: Machine) -> dict[str, Any]:
+def root_attributes(reader: InputReader) -> dict[str, Any]:
     """Attributes that hold for every record of a data set."""
+    system = reader.machine()
     geometry, torque_of = {}, {}
-    if not read_plan_options(config).varies_gears:
+    if not reader.plan.varies_gears:
         geometry = gear_columns(system.pair)
     if system.torque_of:
         torque_of = {"torque_of": system.torque_of}
@@ -241,12 +235,12 @@ def root_attributes(config: Configuration, system: Machine) -> dict[str, Any]:
         "channel_names": list(system.sensing.channel_names),
         "source_names": list(system.sensing.channels),
         "channel_units": [channel_unit(name) for name in system.sensing.channel_names],
-        **_shaft_sensors(read_dataset_options(config), system),
+        **_shaft_sensors(reader.dataset, system),
         **torque_of,
-        "class_names": list(config["plan"]["classes"]),
+        "class_names": list(reader.plan.classes),
         **geometry,
         **_gears_of_line(system),
         "config_json": json.dumps(
-            config.with_entries(out=None, executor=None).plain(), sort_keys=True
+            reader.config.with_entries(out=None, executor=None).plain(), sort_keys=True
         ),
     }

@@ -6,7 +6,7 @@ Their bits are those of ``generate``.
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,8 +21,8 @@ from gensig.dynamics.integrator import Solver, records_together
 from gensig.errors import ConfigError, DatasetError
 from gensig.options.configuration import Configuration, whole_number
 from gensig.plan.make import make_plan
+from gensig.record.inputs import InputReader
 from gensig.record.machines import read_machine
-from gensig.record.options import read_dataset_options
 from gensig.record.simulate import Record, simulate_records
 from gensig.sensing.chain import stands_for_channels
 
@@ -180,7 +180,9 @@ class RecordStream:
         """The same part of another epoch; its plan is drawn now."""
         if epoch == self.epoch:
             return self
-        return replace(self, epoch=epoch, plan=make_plan(_at_epoch(self.config, epoch)))
+        seed = epoch_seed(self.config.seed, epoch)
+        plan = make_plan(self.config.with_entries(seed=seed))
+        return replace(self, epoch=epoch, plan=plan)
 
     def epochs(self, count: int | None = None) -> Iterator[RecordStream]:
         """This epoch and those that follow, endless where ``count`` is None."""
@@ -206,7 +208,8 @@ class RecordStream:
 
     def _records(self, numbers: Sequence[int] | NDArray[np.int64]) -> list[Record]:
         rows = [self.plan.record(int(number)) for number in numbers]
-        return _simulate(_at_epoch(self.config, self.epoch), rows)
+        reader = InputReader(self.config.with_entries(seed=self.seed))
+        return [_as_stored(record) for record in simulate_records(reader, rows)]
 
 
 def open_stream(config: Configuration, *, epoch: int = 0) -> RecordStream:
@@ -219,8 +222,8 @@ def open_stream(config: Configuration, *, epoch: int = 0) -> RecordStream:
     GensigError    for whatever ``make_plan`` refuses
     """
     config = config.with_entries(out=None)
-    read_dataset_options(config)  # refuses what no data set has
-    plan = make_plan(_at_epoch(config, epoch))
+    _ = InputReader(config).dataset  # refuses what no data set has
+    plan = make_plan(config.with_entries(seed=epoch_seed(config.seed, epoch)))
     return RecordStream(
         config=config,
         epoch=epoch,
@@ -238,15 +241,6 @@ def epoch_seed(seed: int, epoch: int) -> int:
         return seed
     sequence = np.random.SeedSequence(seed, spawn_key=(EPOCH_STREAM, epoch))
     return int(sequence.generate_state(1, np.uint64)[0]) >> 11
-
-
-def _at_epoch(config: Configuration, epoch: int) -> Configuration:
-    return config.with_entries(seed=epoch_seed(config.seed, epoch))
-
-
-def _simulate(config: Configuration, rows: Sequence[Mapping[str, Any]]) -> list[Record]:
-    """Records of some rows of a plan; nothing else in this module simulates."""
-    return [_as_stored(record) for record in simulate_records(config, rows)]
 
 
 def _as_stored(record: Record) -> Record:

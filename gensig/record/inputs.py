@@ -9,16 +9,21 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any
+from functools import cached_property, lru_cache
+from types import MappingProxyType
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.dataset.folder.manifest import identity_hash
 from gensig.errors import DatasetError, SimulationError
 from gensig.faults.base import Fault
 from gensig.faults.registry import read_faults
 from gensig.geometry.gear import Gear
+from gensig.life.life_options import LifeOptions, read_life, runs_to_failure
+from gensig.life.options import WearOptions, read_wear_options
+from gensig.life.root.strength import Strength
 from gensig.options.configuration import Configuration
 from gensig.record.machines import read_machine
 from gensig.record.options import (
@@ -39,14 +44,18 @@ from gensig.sensing.manufacturing import (
     with_damping_ratio,
 )
 from gensig.systems.base import Machine, further_gears
+from gensig.systems.derived_sizes import completed
 from gensig.systems.lead_in import simulate_with_lead_in
 from gensig.systems.nuisances import with_nuisances
+from gensig.systems.registry import LINE, PairParts
 from gensig.systems.run import CleanRecord, Run, Start
 from gensig.systems.shaft_sensors import shaft_signals
+from gensig.version import __version__
 
 Array = NDArray[np.float64]
 Row = Mapping[str, Any]  # one row of a plan, by column
 MISSING = float("nan")
+AS_CONFIGURED: Mapping[str, float] = MappingProxyType({})  # no value is drawn
 NUMBER = re.compile(r"[0-9]{1,18}")  # at the end of an id
 
 # The number of a row that each cause of randomness follows.
@@ -220,17 +229,102 @@ def simulate_motions(
     return motions
 
 
+@final
 class InputReader:
-    """Makes the inputs of the records of one configuration.
+    """Typed values of one configuration, and the inputs of its records.
 
-    Records of a condition share their machine.
+    Each section is read once, when it is first asked for. Records of a condition share their
+    machine.
     """
 
     def __init__(self, config: Configuration) -> None:
         self.config = config
-        self.dataset: DatasetOptions = read_dataset_options(config)
-        self.plan: PlanOptions = read_plan_options(config)
         self._machines: dict[tuple[tuple[str, float], ...], Machine] = {}
+
+    @cached_property
+    def seed(self) -> int:
+        """The root seed."""
+        return self.config.seed
+
+    @cached_property
+    def plan(self) -> PlanOptions:
+        """Options of the plan."""
+        return read_plan_options(self.config.section("plan"))
+
+    @cached_property
+    def dataset(self) -> DatasetOptions:
+        """Options of the data set."""
+        return read_dataset_options(self.config.section("dataset"))
+
+    @property
+    def classes(self) -> Mapping[str, Mapping[str, Any]]:
+        """Fault option of every class of the plan, by boundary keys."""
+        classes: Mapping[str, Mapping[str, Any]] = self.config["classes"]
+        return classes
+
+    @cached_property
+    def runs_to_failure(self) -> bool:
+        """True where the units live until they fail."""
+        return runs_to_failure(self.config.get("life"))
+
+    @cached_property
+    def life(self) -> LifeOptions:
+        """Options of the units' lives."""
+        return read_life(self.config["life"])
+
+    @cached_property
+    def wear(self) -> WearOptions:
+        """Options of wear."""
+        return read_wear_options(self.config.section("wear"))
+
+    @cached_property
+    def strength(self) -> Strength:
+        """Strength of the teeth."""
+        return self.config.section("strength").read(Strength)
+
+    @property
+    def system_kind(self) -> str:
+        """Kind of the machine."""
+        return str(self.config["system"]["kind"])
+
+    @property
+    def is_line(self) -> bool:
+        """True for a drive line."""
+        return self.system_kind == LINE
+
+    @cached_property
+    def parts(self) -> PairParts:
+        """Parts of a gear pair's machine."""
+        return PairParts(self.config)
+
+    @cached_property
+    def identity(self) -> str:
+        """Identity of the data set."""
+        return identity_hash(self.config.plain(), __version__)
+
+    def with_values(self, values: Mapping[str, float]) -> InputReader:
+        """The reader of the configuration with drawn values put in, gears completed.
+
+        Raises
+        ------
+        ConfigError    for a key that does not exist, holds no number, or is fixed for a data set
+        """
+        if not values:
+            return self
+        config = self.config.with_values(values)
+        gear = completed(config.section("gear"))
+        return InputReader(config.with_entries(gear=gear))
+
+    def number(self, key: str) -> float:
+        """The number of a dotted key."""
+        node: Any = self.config
+        for name in key.split("."):
+            node = node[name]
+        return float(node)
+
+    def refuse_fixed(self, key: str) -> None:
+        """Raise ConfigError for a key that no value can be drawn for."""
+        self.config.with_values({key: 0.0})
 
     def inputs(self, row: Row) -> RecordInputs:
         """Inputs of one row of the plan.
@@ -240,7 +334,7 @@ class InputReader:
         GensigError    for values that make no machine, and faults that do not fit
         """
         machine = self.machine(row_values(row))
-        seed, numbers = self.config.seed, RecordNumbers.of(row)
+        seed, numbers = self.seed, RecordNumbers.of(row)
         start = Start(
             tooth_pinion=int(row["start_tooth_pinion"]),
             tooth_wheel=int(row["start_tooth_wheel"]),
@@ -279,7 +373,7 @@ class InputReader:
             dataset=self.dataset,
         )
 
-    def machine(self, values: Mapping[str, float]) -> Machine:
+    def machine(self, values: Mapping[str, float] = AS_CONFIGURED) -> Machine:
         """The machine of the configuration with drawn values put in."""
         drawn = tuple(values.items())
         if drawn not in self._machines:

@@ -8,7 +8,7 @@ from typing import Any
 
 from gensig.dataset.distributions import GRID, Distribution, read_distribution
 from gensig.errors import ConfigError
-from gensig.options.configuration import Configuration, Section, whole_number
+from gensig.options.configuration import Section, whole_number
 from gensig.systems.shaft_sensors import SWITCHES
 from gensig.units import check_choice
 
@@ -53,14 +53,13 @@ class DatasetOptions:
         return self.store_detectability or self.store_healthy_twin
 
 
-def read_dataset_options(config: Configuration) -> DatasetOptions:
-    """Data-set options of a configuration.
+def read_dataset_options(section: Section) -> DatasetOptions:
+    """Options of the group ``dataset``.
 
     Raises
     ------
     ConfigError    for unknown or missing keys, and values of the wrong type
     """
-    section = config.section("dataset")
     switches = [
         field.name for field in fields(DatasetOptions) if field.name.startswith(PREFIX)
     ]
@@ -87,6 +86,7 @@ class PlanOptions:
     sham : whether severities are zero while labels are kept
     machines : ``crossed``: every set of gears runs in every gearbox; ``separate``: every unit has
         gears and a gearbox of its own
+    draws_unit_load : whether the values drawn for the torque are unit loads of the teeth, N/mm2
     fault_gear : ``as_given``: faults are on the gear that their option names; ``drawn``: on
         any gear of the machine, or on one of those listed, with equal chance for each condition
     n_reference : further healthy records of every unit, which are no examples
@@ -100,6 +100,7 @@ class PlanOptions:
     classes: tuple[str, ...]
     design: str
     vary: Mapping[str, Distribution]
+    draws_unit_load: bool
     sham: bool
     # Keys that came after 0.9.0 have defaults: configurations of earlier data sets lack them.
     machines: str = CROSSED
@@ -136,20 +137,19 @@ class PlanOptions:
         return self.machines == SEPARATE
 
 
-KEYS = tuple(field.name for field in fields(PlanOptions))
-REQUIRED = tuple(
-    field.name for field in fields(PlanOptions) if field.default is MISSING
-)
+FIELDS = {field.name: field for field in fields(PlanOptions)}
+del FIELDS["draws_unit_load"]  # told by the key of the torque in ``vary``
+KEYS = tuple(FIELDS)
+REQUIRED = tuple(name for name, field in FIELDS.items() if field.default is MISSING)
 
 
-def read_plan_options(config: Configuration) -> PlanOptions:
-    """Plan options of a configuration.
+def read_plan_options(plan: Section) -> PlanOptions:
+    """Options of the group ``plan``.
 
     Raises
     ------
     ConfigError    for unknown or missing keys, and counts that cannot be used
     """
-    plan = config.section("plan")
     _check_keys(plan)
     if not isinstance(plan["sham"], bool):
         raise ConfigError(f"plan.sham = {plan['sham']!r} must be true or false")
@@ -165,7 +165,13 @@ def read_plan_options(config: Configuration) -> PlanOptions:
         whole_number("plan.n_records", plan["n_records"], at_least=len(plan["classes"]))
     vary = {key: _read_varied(key, spec) for key, spec in plan["vary"].items()}
     plain = plan.without("vary", "fault_gear")
-    return plain.read(PlanOptions, vary=vary, fault_gear=fault_gear)
+    torque = plan["vary"].get(TORQUE_KEY)
+    return plain.read(
+        PlanOptions,
+        vary=vary,
+        fault_gear=fault_gear,
+        draws_unit_load=isinstance(torque, Mapping) and torque.get("of") == UNIT_LOAD,
+    )
 
 
 def _read_fault_gear(given: Any) -> str | tuple[str, ...]:
@@ -194,12 +200,6 @@ def _read_varied(key: str, spec: Any) -> Distribution:
             )
         spec = {name: value for name, value in spec.items() if name != "of"}
     return read_distribution(f"plan.vary.{key}", spec)
-
-
-def draws_unit_load(config: Configuration) -> bool:
-    """True where the plan draws the unit load of the teeth in place of the torque."""
-    spec = config["plan"]["vary"].get(TORQUE_KEY)
-    return isinstance(spec, Mapping) and spec.get("of") == UNIT_LOAD
 
 
 def _check_keys(plan: Section) -> None:

@@ -11,12 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dataset.folder.manifest import identity_hash
 from gensig.dynamics.mesh_state import MeshState, mesh_signals
 from gensig.errors import SimulationError
 from gensig.operation.options import operating_signals
 from gensig.operation.setpoint import Operating
-from gensig.options.configuration import Configuration
 from gensig.record.fault_gain import needs_sound, with_fault_gain
 from gensig.record.inputs import (
     MISSING,
@@ -25,12 +23,10 @@ from gensig.record.inputs import (
     Row,
     simulate_motions,
 )
-from gensig.record.options import read_dataset_options
 from gensig.sensing.chain import detectability
 from gensig.systems.base import Machine
 from gensig.systems.run import CleanRecord
 from gensig.units import from_si
-from gensig.version import __version__
 
 Array = NDArray[np.float64]
 Signals = dict[str, NDArray[Any]]
@@ -48,29 +44,28 @@ class Record:
     values: dict[str, Any]
 
 
-def simulate_record(config: Configuration, row: Row) -> Record:
+def simulate_record(reader: InputReader, row: Row) -> Record:
     """Simulate one row of a plan; see ``simulate_records``."""
-    return simulate_records(config, [row])[0]
+    return simulate_records(reader, [row])[0]
 
 
-def simulate_records(config: Configuration, rows: Sequence[Row]) -> list[Record]:
+def simulate_records(reader: InputReader, rows: Sequence[Row]) -> list[Record]:
     """Simulate rows of a plan together with the healthy twins that set their noise.
 
     The bits of a record do not depend on the other rows. A motion that does not stay finite
     becomes a record marked as failed.
     """
-    return list(finished_records(config, rows))
+    return list(finished_records(reader, rows))
 
 
-def finished_records(config: Configuration, rows: Sequence[Row]) -> Iterator[Record]:
+def finished_records(reader: InputReader, rows: Sequence[Row]) -> Iterator[Record]:
     """The records of ``simulate_records``, each measured when it is asked for.
 
     All motions are simulated before the first, but the samples of one record only are in memory
     where each is stored at once.
     """
-    reader = InputReader(config)
     inputs = [reader.inputs(row) for row in rows]
-    keys = _twin_keys(config, rows)
+    keys = [(reader.identity, str(row["condition_id"])) for row in rows]
     twins = _missing_twins(inputs, keys)
     stored = reader.dataset.needs_sound_records
     sound = {
@@ -90,7 +85,7 @@ def finished_records(config: Configuration, rows: Sequence[Row]) -> Iterator[Rec
             sound=of_sound_machine,
             twin_power=_TWINS.power.get(keys[index]),
         )
-        yield _record(config, row, measured)
+        yield _record(reader, row, measured)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -143,7 +138,7 @@ class _Measured:
         return signals
 
 
-def _record(config: Configuration, row: Row, measured: _Measured) -> Record:
+def _record(reader: InputReader, row: Row, measured: _Measured) -> Record:
     """Path, sensor, noise, labels and result columns of one row."""
     try:
         record = _finished(measured)
@@ -155,7 +150,7 @@ def _record(config: Configuration, row: Row, measured: _Measured) -> Record:
     if isinstance(measured.motion, CleanRecord):
         motion = measured.motion
         angle = motion.shaft_angle
-    signals = {**record.signals, "fault_multihot": _multihot(config, row)}
+    signals = {**record.signals, "fault_multihot": _multihot(reader, row)}
     if dataset.store_operating:
         rate = machine.sensing.sampling_rate
         signals |= operating_signals(
@@ -259,16 +254,14 @@ def _n_samples(machine: Machine) -> int:
     return round(machine.operating.duration * machine.sensing.sampling_rate)
 
 
-def signal_shapes(
-    config: Configuration, machine: Machine
-) -> dict[str, tuple[int, ...]]:
+def signal_shapes(reader: InputReader) -> dict[str, tuple[int, ...]]:
     """Shape of every array of one record, by signal name."""
-    dataset = read_dataset_options(config)
+    dataset, machine = reader.dataset, reader.machine()
     n_channels, n_samples = len(machine.sensing.channel_names), _n_samples(machine)
     sensors, samples = (n_channels, n_samples), (n_samples,)
     shapes: dict[str, tuple[int, ...]] = {
         "acceleration": sensors,
-        "fault_multihot": (len(config["plan"]["classes"]),),
+        "fault_multihot": (len(reader.plan.classes),),
         "signal_power": (n_channels,),
         "noise_power": (n_channels,),
     }
@@ -307,14 +300,13 @@ def _mesh_signals(machine: Machine, motion: CleanRecord | None) -> Signals:
     return signals
 
 
-def _multihot(config: Configuration, row: Row) -> NDArray[np.int8]:
+def _multihot(reader: InputReader, row: Row) -> NDArray[np.int8]:
     """1 for the record's class and, where its fault is compound, for the classes of its parts."""
     parts = json.loads(str(row["faults_json"]))
     kinds = {part["kind"] for part in parts if len(parts) > 1}
-    classes = config["classes"]
     present = [
-        label == int(row["label"]) or classes[name]["kind"] in kinds
-        for label, name in enumerate(config["plan"]["classes"])
+        label == int(row["label"]) or reader.classes[name]["kind"] in kinds
+        for label, name in enumerate(reader.plan.classes)
     ]
     return np.array(present, dtype=np.int8)
 
@@ -335,11 +327,6 @@ _TWINS = _Twins()
 def forget_twins() -> None:
     """Drop what is kept of healthy twins, so that a timing counts them."""
     _TWINS.power.clear()
-
-
-def _twin_keys(config: Configuration, rows: Sequence[Row]) -> list[TwinKey]:
-    identity = identity_hash(config.plain(), __version__)
-    return [(identity, str(row["condition_id"])) for row in rows]
 
 
 def _missing_twins(

@@ -14,7 +14,6 @@ from gensig.faults.registry import fault_parts, read_faults
 from gensig.life.options import WearOptions
 from gensig.life.wear.wear_case import WearCase
 from gensig.life.wear.wear_life import WearLife, wear_life
-from gensig.options.configuration import Configuration
 from gensig.record.inputs import InputReader, RecordInputs, simulate_motions
 from gensig.sensing.chain import power
 from gensig.systems.base import Machine
@@ -111,7 +110,7 @@ class _Bench:
 
 
 def limited_by_vibration(
-    case: WearCase, config: Configuration, gears: Mapping[str, str] = OF_PAIR
+    case: WearCase, reader: InputReader, gears: Mapping[str, str] = OF_PAIR
 ) -> tuple[WearCase, WornVibration | None]:
     """The case with the depth of a limit of vibration as threshold, and the measured course.
 
@@ -133,7 +132,7 @@ def limited_by_vibration(
     options = case.options
     if options.vibration_limit_m_per_s2 is None and options.vibration_rise is None:
         return case, None
-    bench = _bench(case, config, gears)
+    bench = _bench(case, reader, gears)
     life = wear_life(case)
     turns = np.linspace(0.0, life.life, N_LOOKS)
     looks = bench.rms([_worn(life, turn) for turn in turns])
@@ -171,10 +170,8 @@ def limited_by_vibration(
     return replace(case, options=replace(options, threshold=limit_depth)), course
 
 
-def _bench(case: WearCase, config: Configuration, gears: Mapping[str, str]) -> _Bench:
-    config = config.with_keys("plan", sham=False)
-    config = config.with_keys("dataset", store_mesh_state=False)
-    sound = InputReader(config).inputs(ROW)
+def _bench(case: WearCase, reader: InputReader, gears: Mapping[str, str]) -> _Bench:
+    sound = reader.inputs(ROW).without_faults()
     sound.machine.check()
     bench = _Bench(sound=sound, case=case, gears=gears)
     if not bench.sensors:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from functools import cached_property
+from typing import Any, final
 
 from gensig.dynamics.integrator import Solver
 from gensig.dynamics.pair import Body, Rotor, Support, solid_disc
@@ -14,6 +15,8 @@ from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.modification import FlankModification, PairModification, sound_teeth
 from gensig.mesh.options import (
+    MeshOptions,
+    SliceOptions,
     read_mesh_options,
     read_slice_options,
     refuse_papers_heat,
@@ -53,20 +56,108 @@ LINE = "shaft_line"
 SYSTEM_KEYS = ("kind", "supports", "motor", "load")
 
 
-def read_spur_pair(config: Configuration) -> SpurPair:
-    """Build a spur pair from the boundary keys of a configuration."""
-    modification = read_modification(config)
-    refuse_papers_heat(read_mesh_options(config.section("mesh")), "system=spur_pair")
-    gear = config.section("gear")
-    if _number("gear.helix_angle_deg", gear["helix_angle_deg"]) != 0.0:
-        raise ConfigError(
-            f"gear.helix_angle_deg = {gear['helix_angle_deg']:g}: system=spur_pair takes spur "
-            "gears, 0; helical ones have system=helical_pair"
+@final
+class PairParts:
+    """Parts of a gear pair's machine, each section of the configuration read once.
+
+    A section is read when it is first asked for.
+    """
+
+    def __init__(self, config: Configuration) -> None:
+        self._config = config
+
+    def section(self, name: str) -> Section:
+        """A group of keys."""
+        return self._config.section(name)
+
+    @cached_property
+    def gear(self) -> Section:
+        """The group ``gear``, sizes that are null filled."""
+        return completed(self.section("gear"))
+
+    @cached_property
+    def pair(self) -> GearPair:
+        """The two cold gears."""
+        return read_pair(self.gear)
+
+    @cached_property
+    def material(self) -> Material:
+        """The material of both gears."""
+        return read_material(self.section("material"))
+
+    @cached_property
+    def heat(self) -> Heat:
+        """Effects of heat, and their parameters."""
+        return self.section("heat").read(Heat)
+
+    @cached_property
+    def mesh(self) -> MeshOptions:
+        """Options of the mesh."""
+        return read_mesh_options(self.section("mesh"))
+
+    @cached_property
+    def slices(self) -> SliceOptions:
+        """Options of the slices of the teeth."""
+        return read_slice_options(self.section("mesh"))
+
+    @cached_property
+    def modification(self) -> PairModification:
+        """Modifications of the flanks."""
+        return read_modification(self.section("modification"))
+
+    @cached_property
+    def flanks(self) -> SlicedPair:
+        """The pair cut into slices, with its effects of heat."""
+        _refuse_line(self.section("system"))
+        if self.heat.is_any:
+            return as_configured(self.duty)
+        return self.cold_flanks
+
+    @property
+    def duty(self) -> Duty:
+        """The cold pair with its heating and cooling."""
+        speed = self.section("operating")["speed_rpm"]
+        return Duty(
+            system=self.cold_flanks,
+            heat=self.heat,
+            speed=_number("operating.speed_rpm", speed),
         )
-    is_hot = read_heat(config).is_any
-    flanks = read_sliced_pair(config) if is_hot else None
-    pair = flanks.pair if flanks else read_pair(config)
-    machine = _read_machine(config, pair)
+
+    @cached_property
+    def cold_flanks(self) -> SlicedPair:
+        """The pair cut into slices, without heat.
+
+        ConfigError for ``mesh.heat_law=paper`` where no teeth grow.
+        """
+        if self.mesh.has_papers_heat and not self.heat.growth:
+            raise ConfigError(
+                f"mesh.heat_law = {self.mesh.heat_law} is for teeth that grow with heat: take "
+                "heat=chongqing_rated or heat.growth=true, or mesh.heat_law=grown"
+            )
+        torque = self.section("operating")["torque_nm"]
+        return SlicedPair(
+            pair=self.pair,
+            material=self.material,
+            mesh=self.mesh,
+            slices=self.slices,
+            modification=self.modification,
+            torque=_number("operating.torque_nm", torque),
+        )
+
+
+def spur_pair(parts: PairParts) -> SpurPair:
+    """A spur pair."""
+    modification = parts.modification
+    refuse_papers_heat(parts.mesh, "system=spur_pair")
+    helix = parts.section("gear")["helix_angle_deg"]
+    if _number("gear.helix_angle_deg", helix) != 0.0:
+        raise ConfigError(
+            f"gear.helix_angle_deg = {helix:g}: system=spur_pair takes spur gears, 0; helical "
+            "ones have system=helical_pair"
+        )
+    flanks = parts.flanks if parts.heat.is_any else None
+    pair = flanks.pair if flanks else parts.pair
+    machine = _common_parts(parts, pair)
     is_linear = machine["mesh"].law == "paper"
     if modification.is_any and is_linear:
         raise ConfigError(
@@ -82,97 +173,52 @@ def read_spur_pair(config: Configuration) -> SpurPair:
         modification = replace(modification, growth=flanks.growth)
         machine["material"] = flanks.material
     sound_teeth(pair, modification)  # raises for reliefs that overlap
-    slices = read_slice_options(config.section("mesh"))
-    return SpurPair(pair=pair, slices=slices, modification=modification, **machine)
+    return SpurPair(
+        pair=pair, slices=parts.slices, modification=modification, **machine
+    )
 
 
-def read_helical_pair(config: Configuration) -> HelicalPair:
-    """Build a helical pair, or a spur pair in slices, from the boundary keys of a configuration."""
-    flanks = read_sliced_pair(config)
-    machine = _read_machine(config, flanks.pair)
+def helical_pair(parts: PairParts) -> HelicalPair:
+    """A helical pair, or a spur pair in slices."""
+    flanks = parts.flanks
+    machine = _common_parts(parts, flanks.pair)
     bodies = {
-        name: held_axially(machine[name], gear, read_gear_group(config).section(name))
+        name: held_axially(machine[name], gear, parts.gear.section(name))
         for name, gear in flanks.pair.gears.items()
     }
     return HelicalPair(pair=flanks.pair, flanks=flanks, **{**machine, **bodies})
 
 
-def _read_machine(config: Configuration, pair: GearPair) -> dict[str, Any]:
+def _common_parts(parts: PairParts, pair: GearPair) -> dict[str, Any]:
     """Common fields of the machines of spur and helical pairs, by the names of the fields."""
-    material = read_material(config)
-    machine = config.section("system")
+    material = parts.material
+    machine = parts.section("system")
     for key in machine:
         if key not in SYSTEM_KEYS:
             known = ", ".join(SYSTEM_KEYS)
             raise ConfigError(f"system: unknown key '{key}'; known: {known}")
-    operating = read_operating(config.section("operating"))
-    quality = read(Quality, config.section("quality"), "quality")
-    bodies = _read_bodies(config, pair, material, operating.torque, quality)
+    operating = read_operating(parts.section("operating"))
+    quality = parts.section("quality").read(Quality)
+    bodies = _read_bodies(parts, pair, operating.torque, quality)
     return {
         "material": material,
-        "mesh": read_mesh_options(config.section("mesh")),
+        "mesh": parts.mesh,
         **bodies,
         "operating": operating,
-        "sensing": read_sensing(config.section("sensing")),
+        "sensing": read_sensing(parts.section("sensing")),
         "quality": quality,
-        "solver": read(Solver, config.section("solver"), "solver"),
+        "solver": parts.section("solver").read(Solver),
         "motor": _read_rotor("system.motor", machine.get("motor")),
         "load": _read_rotor("system.load", machine.get("load")),
     }
 
 
-def read_sliced_pair(config: Configuration) -> SlicedPair:
-    """Build a spur or helical pair cut into slices, of any system of pairs.
-
-    The pair has the effects of heat of the configuration.
-    """
-    _refuse_line(config)
-    if read_heat(config).is_any:
-        return as_configured(read_duty(config))
-    return read_cold_pair(config)
-
-
-def read_duty(config: Configuration) -> Duty:
-    """The cold pair of a configuration with its heating and cooling."""
-    speed = _number("operating.speed_rpm", config.section("operating")["speed_rpm"])
-    return Duty(system=read_cold_pair(config), heat=read_heat(config), speed=speed)
-
-
-def read_cold_pair(config: Configuration) -> SlicedPair:
-    """The sliced pair of a configuration without heat.
-
-    Raises
-    ------
-    ConfigError    for ``mesh.heat_law=paper`` where no teeth grow
-    """
-    mesh = config.section("mesh")
-    options = read_mesh_options(mesh)
-    if options.has_papers_heat and not read_heat(config).growth:
-        raise ConfigError(
-            f"mesh.heat_law = {options.heat_law} is for teeth that grow with heat: take "
-            "heat=chongqing_rated or heat.growth=true, or mesh.heat_law=grown"
-        )
-    return SlicedPair(
-        pair=read_pair(config),
-        material=read_material(config),
-        mesh=options,
-        slices=read_slice_options(mesh),
-        modification=read_modification(config),
-        torque=_number("operating.torque_nm", config.section("operating")["torque_nm"]),
-    )
-
-
-def read_gear_group(config: Configuration) -> Section:
-    """The group ``gear`` of a configuration, sizes that are null filled."""
-    return completed(config.section("gear"))
-
-
-def read_pair(config: Configuration) -> GearPair:
-    """The two gears of a configuration; by default the wheel has the opposite hand.
+def read_pair(gear: Section) -> GearPair:
+    """The two gears of the group ``gear``; by default the wheel has the opposite hand.
 
     A backlash that is null is the recommended one.
     """
-    gear = read_gear_group(config)
+    gear = completed(gear)
     helix = _number("gear.helix_angle_deg", gear["helix_angle_deg"])
     pinion, wheel = (
         _read_gear(name, gear, hand * helix)
@@ -187,39 +233,32 @@ def read_pair(config: Configuration) -> GearPair:
     return replace(pair, backlash=to_si("backlash_um", recommended))
 
 
-def read_material(config: Configuration) -> Material:
-    """The material of a configuration."""
-    material = read(Material, config.section("material"), "material")
+def read_material(section: Section) -> Material:
+    """The material of the group ``material``."""
+    material = section.read(Material)
     ratio = material.poisson_ratio
     if ratio >= 0.5:
         raise ConfigError(f"material.poisson_ratio = {ratio:g} must be below 0.5")
     return material
 
 
-def read_heat(config: Configuration) -> Heat:
-    """Effects of heat of a configuration, and their parameters."""
-    return read(Heat, config.section("heat"), "heat")
-
-
-def read_modification(config: Configuration) -> PairModification:
-    """Flank modifications of a configuration's gears."""
+def read_modification(section: Section) -> PairModification:
+    """Flank modifications of both gears, of the group ``modification``."""
     sides = {}
     for name in SIDES:
         try:
-            side = config.section("modification", name)
-            sides[name] = read(FlankModification, side, f"modification.{name}")
+            sides[name] = section.section(name).read(FlankModification)
         except ConfigError as error:
             text = str(error)
             if not text.startswith("modification"):
                 text = f"modification.{name}.{text}"
             raise ConfigError(text) from None
-    common = config.section("modification").without(*SIDES)
-    return read(PairModification, common, "modification", **sides, growth=None)
+    return section.without(*SIDES).read(PairModification, **sides, growth=None)
 
 
-SYSTEMS: dict[str, Callable[[Configuration], GearPairMachine]] = {
-    "spur_pair": read_spur_pair,
-    SLICED: read_helical_pair,
+SYSTEMS: dict[str, Callable[[PairParts], GearPairMachine]] = {
+    "spur_pair": spur_pair,
+    SLICED: helical_pair,
 }
 
 
@@ -231,7 +270,7 @@ def read_system(config: Configuration) -> GearPairMachine:
     ConfigError, GeometryError    for invalid keys or values
     """
     kind = config.section("system").get("kind")
-    _refuse_line(config)
+    _refuse_line(config.section("system"))
     if config.get("excitation") is not None:
         raise ConfigError(
             "excitation turns a drive line (system=engine_gear_train, gensig forced-response); "
@@ -240,13 +279,20 @@ def read_system(config: Configuration) -> GearPairMachine:
     if kind not in SYSTEMS:
         allowed = ", ".join((*SYSTEMS, LINE))
         raise ConfigError(f"system.kind = {kind!r}; allowed: {allowed}")
-    machine = SYSTEMS[kind](config)
+    machine = SYSTEMS[kind](PairParts(config))
     return replace(machine, sensing=machine.sensing.of_machine(machine.channels))
 
 
-def _refuse_line(config: Configuration) -> None:
+def read_sliced_pair(config: Configuration) -> SlicedPair:
+    """Build a spur or helical pair cut into slices, of any system of pairs.
+
+    The pair has the effects of heat of the configuration.
+    """
+    return PairParts(config).flanks
+
+
+def _refuse_line(machine: Section) -> None:
     """Raise ConfigError for a drive line."""
-    machine = config.section("system")
     if machine.get("kind") == LINE:
         raise ConfigError(
             f"system={machine.get('name')} is a drive line from tables, for gensig modes, "
@@ -264,19 +310,16 @@ def _read_gear(name: str, gear: Section, helix_angle: float) -> Gear:
 
 
 def _read_bodies(
-    config: Configuration,
-    pair: GearPair,
-    material: Material,
-    torque: float,
-    quality: Quality,
+    parts: PairParts, pair: GearPair, torque: float, quality: Quality
 ) -> dict[str, Body]:
     """Both gears on their supports, by name.
 
     With ``system.supports=bearings`` bearings carry ``torque`` in N m of the pinion. Without it
     what is null of a support follows from bearings at the rated torque.
     """
-    is_on_bearings = on_bearings(config.section("system").get("supports", AS_GIVEN))
-    sizes, bodies, ratio = read_gear_group(config), {}, DAMPING_RATIO
+    is_on_bearings = on_bearings(parts.section("system").get("supports", AS_GIVEN))
+    sizes, material = parts.gear, parts.material
+    bodies, ratio = {}, DAMPING_RATIO
     if is_on_bearings and quality.support_damping_ratio is not None:
         ratio = 0.0  # drawn for each gearbox
     for name, gear in pair.gears.items():

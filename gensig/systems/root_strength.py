@@ -29,7 +29,6 @@ from gensig.options.configuration import Configuration
 from gensig.sensing.manufacturing import Quality
 from gensig.systems.registry import SLICED, read_sliced_pair, read_system
 from gensig.systems.sliced_pair import SlicedPair
-from gensig.units import read
 
 Array = NDArray[np.float64]
 
@@ -252,6 +251,6 @@ def read_root_strength(config: Configuration) -> RootStrength:
     return RootStrength(
         flanks=flanks,
         sliced=sliced or flanks.pair.pinion.helix_angle != 0.0,
-        strength=read(Strength, config.section("strength"), "strength"),
-        grade=read(Quality, config.section("quality"), "quality").iso1328_grade,
+        strength=config.section("strength").read(Strength),
+        grade=config.section("quality").read(Quality).iso1328_grade,
     )

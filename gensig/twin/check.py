@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gensig.errors import SimulationError
 from gensig.options.configuration import Configuration
 from gensig.plan.make import make_plan
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_records
 from gensig.sensing.agreement import third_octave_bands, third_octave_power
 from gensig.signals.indicators import crest_factor, kurtosis, rms
@@ -150,7 +151,7 @@ def _healthy_records(config: Configuration) -> list[tuple[Array, Array]]:
     drawn = make_plan(whole)
     rows = [drawn.record(index) for index in range(N_RECORDS)]
     records = []
-    for record in simulate_records(whole, rows):
+    for record in simulate_records(InputReader(whole), rows):
         if record.values.get("status") == "failed":
             reason = record.values["status_reason"]
             raise SimulationError(f"a healthy record of the twin failed: {reason}")

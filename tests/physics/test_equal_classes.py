@@ -22,7 +22,7 @@ FREE = "its tooth touches nothing, so the signal is that of missing_tooth"
 
 def told(*words):
     config = read_request([*SMALL, *words]).config
-    return equal_classes(config, make_plan(config))
+    return equal_classes(InputReader(config), make_plan(config))
 
 
 def back(machine, gear, distance):
@@ -56,7 +56,7 @@ def records(*words):
     base = ("plan.n_records=1", "operating.duration_s=0.1", "sensing.snr_db=null")
     config = read_request([*base, *words]).config
     plan = make_plan(config)
-    (record,) = simulate_records(config, [plan.record(0)])
+    (record,) = simulate_records(InputReader(config), [plan.record(0)])
     return record.signals["acceleration"]
 
 
@@ -80,7 +80,7 @@ def test_no_plan_draws_a_tooth_that_never_touches(system):
     words = (f"system={system}", "fault=pitch_error")
     config = read_request([*SMALL, *words, "plan.n_records=60"]).config
     plan = make_plan(config)
-    assert equal_classes(config, plan) == []
+    assert equal_classes(InputReader(config), plan) == []
     drawn = plan.columns["params/fault.pitch_error_um"]
     reach = 1e6 * tooth_reach(read_machine(config), "pinion")
     assert drawn.min() < -40.0
@@ -135,7 +135,7 @@ def test_two_classes_with_one_fault_are_told(tmp_path):
     config = read_request(
         [*SMALL, classes, "fault.vary={}"], config_dir=tmp_path
     ).config
-    (line,) = equal_classes(config, make_plan(config))
+    (line,) = equal_classes(InputReader(config), make_plan(config))
     assert "fault=other: its largest fault has the signal of pitting" in line
 
 

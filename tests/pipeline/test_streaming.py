@@ -17,7 +17,7 @@ from gensig.errors import ConfigError, DatasetError
 from gensig.production.shard_writing import root_attributes
 from gensig.production.streaming import _as_stored, epoch_seed, open_stream
 from gensig.record import simulate
-from gensig.record.machines import read_machine
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import Record
 
 SMALL = (
@@ -225,7 +225,7 @@ def test_replayed_windows_are_parts_of_the_stored_records(stream, stored):
 def test_a_stream_names_the_gears_of_the_stored_set(stream, stored):
     assert stream.gear_names == stored.gear_names == ["pinion", "wheel"]
     line = gensig.stream("experiment=two_stage", "plan.n_records=5")
-    attributes = root_attributes(line.config, read_machine(line.config))
+    attributes = root_attributes(InputReader(line.config))
     assert line.gear_names == attributes["gear_names"]
     assert len(line.gear_names) == 4
 

@@ -8,6 +8,7 @@ import pytest
 import benchmarks
 from benchmarks._stages import CLOCKED, Stages
 from gensig.plan.make import make_plan
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_records
 
 WITH_ROSS = "_ross_time", "_ross_time_response", "_ross_values"
@@ -31,8 +32,5 @@ def test_runs_are_counted(config_with):
     config = config_with({"plan.n_records": 2, "operating.duration_s": 0.02})
     plan, stages = make_plan(config), Stages()
     with stages.watching(1024):
-        simulate_records(
-            config,
-            [plan.record(0), plan.record(1)],
-        )
+        simulate_records(InputReader(config), [plan.record(0), plan.record(1)])
     assert stages.n_runs >= 2

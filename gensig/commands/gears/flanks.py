@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +26,7 @@ from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.geometry.contact import GearPair
 from gensig.mesh.options import MOST_SLICES
-from gensig.options.configuration import Configuration
-from gensig.systems.registry import read_sliced_pair
+from gensig.systems.registry import PairParts, read_sliced_pair
 from gensig.systems.sliced_pair import SlicedPair, TransmissionError
 from gensig.terminal.printing import show
 from gensig.terminal.warning_lines import one_line_warnings
@@ -118,17 +118,19 @@ def transmission_error_content(
     }
 
 
-def sliced_stiffness(config: Configuration, arguments: Namespace) -> int:
+def sliced_stiffness(
+    parts: PairParts, fault: Mapping[str, Any], arguments: Namespace
+) -> int:
     """``gensig stiffness`` of a pair cut into slices."""
     faulty = None
     with one_line_warnings("gensig"):
-        system, faults = read_sliced_pair(config), read_faults(config["fault"])
+        system, faults = parts.flanks, read_faults(fault)
         result = sound = system.transmission_error()
         position, single = system.single_pair()
         if faults:
             result = system.transmission_error(faults)
             faulty = system.faulty_pair(faults, position)
-        hot = heat_report(config)
+        hot = heat_report(parts.duty)
     pair, contact = system.pair, result.contact
     stiffness = contact.stiffness
     content = {
@@ -177,15 +179,15 @@ def sliced_stiffness(config: Configuration, arguments: Namespace) -> int:
     return 0
 
 
-def sound_pair(config: Configuration) -> SlicedPair:
-    """The pair of a configuration without a fault."""
-    if read_faults(config["fault"]):
+def sound_pair(parts: PairParts, fault: Mapping[str, Any]) -> SlicedPair:
+    """The pair, which must be without a fault."""
+    if read_faults(fault):
         raise ConfigError(
-            f"fault={config['fault']['kind']}: a modification is for healthy flanks; "
+            f"fault={fault['kind']}: a modification is for healthy flanks; "
             "take fault=healthy, and gensig transmission-error "
             "with that modification and the fault"
         )
-    return read_sliced_pair(config)
+    return parts.flanks
 
 
 def _print_contact_ratios(pair: GearPair) -> None:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from gensig.mesh.thermal.body_heat import BodyHeat
-from gensig.options.configuration import Configuration
 from gensig.systems.hot_pair import (
     APPARENT,
     COLD,
@@ -26,7 +25,6 @@ from gensig.systems.hot_pair import (
     hot_state,
     stiffness_variants,
 )
-from gensig.systems.registry import read_duty
 from gensig.terminal.printing import show
 
 NAMES = {
@@ -52,9 +50,8 @@ class HeatReport:
     variants: dict[str, Variant]
 
 
-def heat_report(config: Configuration) -> HeatReport | None:
-    """Temperatures and stiffness of a configuration's pair; None where nothing is hot."""
-    duty = read_duty(config)
+def heat_report(duty: Duty) -> HeatReport | None:
+    """Temperatures and stiffness of a pair at work; None where nothing is hot."""
     if not duty.heat.is_any:
         return None
     state = hot_state(duty)

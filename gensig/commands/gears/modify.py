@@ -21,6 +21,7 @@ from gensig.commands.request import read_configuration
 from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification, PairModification
 from gensig.systems.flank_optimum import Cases, Optimum, judge, optimise
+from gensig.systems.registry import PairParts
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.terminal.printing import show
 from gensig.terminal.warning_lines import one_line_warnings
@@ -41,7 +42,7 @@ def modify_flank(arguments: Namespace) -> int:
     target = option_file(arguments.out, GROUP, force=arguments.force)
     config = read_configuration(arguments)
     with one_line_warnings("gensig"):
-        system = sound_pair(config)
+        system = sound_pair(PairParts(config), config["fault"])
         given = system.modification.misalignment
         misalignments = (given + value * 1e-6 for value in arguments.misalignments)
         cases = Cases(

@@ -16,7 +16,7 @@ from gensig.faults.registry import read_faults
 from gensig.mesh.pair_table import PairTable
 from gensig.record.machines import read_machine
 from gensig.systems.base import Machine
-from gensig.systems.registry import SLICED
+from gensig.systems.registry import SLICED, PairParts
 from gensig.systems.spur_pair import SpurPair
 from gensig.systems.stiffness_curves import StiffnessCurves
 from gensig.terminal.printing import show
@@ -32,7 +32,7 @@ def stiffness(arguments: Namespace) -> int:
     if config["system"].get("kind") == SLICED:
         from gensig.commands.gears.flanks import sliced_stiffness
 
-        return sliced_stiffness(config, arguments)
+        return sliced_stiffness(PairParts(config), config["fault"], arguments)
     system = read_machine(config)
     faults = read_faults(config["fault"])
     curves = system.stiffness_curves(faults)

@@ -17,7 +17,7 @@ from gensig.commands.figures.motor_figures import turner
 from gensig.driveline.machine import LineMachine
 from gensig.dynamics.response import natural_frequencies
 from gensig.errors import ConfigError
-from gensig.options.configuration import Configuration
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import Record
 from gensig.signals.resampling import PASS_SHARE
 from gensig.signals.run_up.level_map import LevelMap, decibels, peaks_over_speed
@@ -43,7 +43,6 @@ MOST_DAMPING = 0.5
 LEAST_STANDING = 10.0  # dB of a peak over the median of the orders around it; assumed
 REACH = 4.0  # orders on either side of it
 RPM = from_si("speed_rpm", 1.0)
-TRACES = ("shaft_speed", "torque_set")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,24 +105,15 @@ class RunUp:
         return {name: rpm for name, rpm in met.items() if low <= rpm <= high}
 
 
-def with_traces(config: Configuration) -> Configuration:
-    """The configuration of a record whose shaft speed is stored where its course is not constant.
+def with_traces(reader: InputReader) -> InputReader:
+    """The reader of a record whose shaft speed is stored where its course is not constant.
 
     Samples stay the same.
     """
+    config = reader.config
     if config.section("operating").get("speed_profile") is None:
-        return config
-    return config.with_keys("dataset", store_operating=True)
-
-
-def without_traces(config: Configuration, record: Record) -> Record:
-    """A record of `with_traces` as its configuration itself makes it."""
-    if config["dataset"].get("store_operating"):
-        return record
-    signals = {
-        name: values for name, values in record.signals.items() if name not in TRACES
-    }
-    return Record(signals=signals, values=record.values)
+        return reader
+    return InputReader(config.with_keys("dataset", store_operating=True))
 
 
 def shaft_angle(machine: Machine, record: Record) -> NDArray[np.float64]:

@@ -20,13 +20,11 @@ from gensig.commands.gears.run_up import (
     refusals,
     shaft_angle,
 )
-from gensig.commands.gears.simulate import configured_record
+from gensig.commands.gears.simulate import configured_row
 from gensig.commands.output import check_outputs, write_outputs
 from gensig.errors import ConfigError
-from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
-from gensig.record.machines import read_machine
-from gensig.record.simulate import Record
+from gensig.record.simulate import Record, simulate_record
 from gensig.signals.run_up.level_map import decibels
 from gensig.signals.run_up.speed_maps import LEAST_CHANGE, order_map
 from gensig.systems.base import Machine
@@ -74,11 +72,12 @@ def run_up(arguments: Namespace) -> int:
     variants: dict[str, Vibration] = {}
     for name, config in configs.items():
         step(f"run-up of {name}")
-        record = configured_record(config)
+        reader, row = configured_row(config)
+        record = simulate_record(reader, row)
         if record.values.get("status") == "failed":
             remark(f"{name}: {record.values['status_reason']}")
             return 1
-        variants[name] = _vibration(config, record)
+        variants[name] = _vibration(reader.machine(), record)
     speed = variants[FIRST].speed
     variants = {name: each.at(speed) for name, each in variants.items()}
     content = _content(variants)
@@ -91,9 +90,8 @@ def run_up(arguments: Namespace) -> int:
     return 0
 
 
-def _vibration(config: Configuration, record: Record) -> Vibration:
+def _vibration(machine: Machine, record: Record) -> Vibration:
     """Vibration of one record; ConfigError where it is no run-up."""
-    machine = read_machine(config)
     channels = _acceleration_channels(machine)
     angle = None
     if "shaft_speed" in record.signals:

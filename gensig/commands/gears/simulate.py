@@ -17,7 +17,6 @@ from gensig.commands.gears.run_up import (
     print_run_up,
     read_run_up,
     with_traces,
-    without_traces,
     write_levels,
 )
 from gensig.commands.output import FIGURE_TYPES, check_file, check_new
@@ -30,7 +29,7 @@ from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.production.reproduction import recorded_row, simulate_twin
 from gensig.production.shard_writing import open_shard
-from gensig.record.machines import read_machine
+from gensig.record.inputs import InputReader
 from gensig.record.options import AS_GIVEN, CROSSED
 from gensig.record.simulate import Record, simulate_record
 from gensig.signals.indicators import crest_factor, kurtosis, rms
@@ -60,20 +59,12 @@ def simulate(arguments: Namespace) -> int:
             "--record and --twin are of a data set; give it with --from DIR"
         )
     config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
-    config, row = configured_row(config)
-    return _show(config, row, simulate_record(config, row), arguments)
+    reader, row = configured_row(config)
+    return _show(reader, row, simulate_record(reader, row), arguments)
 
 
-def configured_record(config: Configuration) -> Record:
-    """The record of a configuration, every value as configured rather than drawn.
-
-    It has the traces of `with_traces`.
-    """
-    return simulate_record(*configured_row(config))
-
-
-def configured_row(config: Configuration) -> tuple[Configuration, Mapping[str, Any]]:
-    """The configuration of one record with traces, and its row of the plan.
+def configured_row(config: Configuration) -> tuple[InputReader, Mapping[str, Any]]:
+    """The reader of one record with traces, and its row of the plan.
 
     Every value is as configured rather than drawn.
     """
@@ -96,8 +87,9 @@ def configured_row(config: Configuration) -> tuple[Configuration, Mapping[str, A
         classes={name: without_vary(config["fault"])}, life={"kind": NO_LIFE}
     )
     plan = make_plan(config)
-    note(*plan_doubts(config, plan))
-    return with_traces(config), plan.record(0)
+    reader = InputReader(config)
+    note(*plan_doubts(reader, plan))
+    return with_traces(reader), plan.record(0)
 
 
 def _simulate_recorded(arguments: Namespace) -> int:
@@ -109,16 +101,16 @@ def _simulate_recorded(arguments: Namespace) -> int:
         )
     if arguments.record is None:
         raise ConfigError("--from needs --record I, the number or id of a record")
-    config, row = recorded_row(Path(arguments.folder), arguments.record)
-    config = with_traces(config)
+    reader, row = recorded_row(Path(arguments.folder), arguments.record)
+    reader = with_traces(reader)
     if not arguments.twin:
-        return _show(config, row, simulate_record(config, row), arguments)
+        return _show(reader, row, simulate_record(reader, row), arguments)
     name = f"healthy twin of {row['record_id']} ({row['label_name']})"
-    return _show(config, row, simulate_twin(config, row), arguments, name)
+    return _show(reader, row, simulate_twin(reader, row), arguments, name)
 
 
 def _show(
-    config: Configuration,
+    reader: InputReader,
     row: Mapping[str, Any],
     record: Record,
     arguments: Namespace,
@@ -132,18 +124,18 @@ def _show(
     if values.get("status") == "failed" or acceleration is None:
         remark(f"{values['status_reason']}")
         return 1
-    system = read_machine(config)
+    system = reader.machine()
     run_up = _run_up(system, record, arguments)
     if arguments.output:
         with replaced_file(arguments.output) as path:
             if path.suffix == ".csv":
                 _write_csv(system, acceleration, path)
             else:
-                _write_shard(config, without_traces(config, record), path)
+                _write_shard(reader, record, path)
     if arguments.plot:
         with replaced_file(arguments.plot) as path:
             if run_up is None:
-                sound = _without_fault(config, row, record)
+                sound = _without_fault(reader, row, record)
                 plot_record(system, acceleration, values, path, name=name, sound=sound)
             else:
                 plot_run_up(run_up, path, name=record_name(values, name))
@@ -160,7 +152,7 @@ def _show(
 
 
 def _without_fault(
-    config: Configuration, row: Mapping[str, Any], record: Record
+    reader: InputReader, row: Mapping[str, Any], record: Record
 ) -> np.ndarray | None:
     """Acceleration of the same record of the healthy machine, (channel, sample).
 
@@ -169,7 +161,7 @@ def _without_fault(
     if record.values["faults_json"] == "[]":
         return None
     try:
-        return simulate_twin(config, row).signals["acceleration"]
+        return simulate_twin(reader, row).signals["acceleration"]
     except SimulationError:
         return None
 
@@ -197,14 +189,14 @@ def _run_up(system: Machine, record: Record, arguments: Namespace) -> RunUp | No
     return run_up
 
 
-def _write_shard(config: Configuration, record: Record, path: Path) -> None:
+def _write_shard(reader: InputReader, record: Record, path: Path) -> None:
     """Write one record as a shard of one row."""
     params = [
         name.removeprefix("params/")
         for name in record.values
         if name.startswith("params/")
     ]
-    with open_shard(path, config, 1, params) as writer:
+    with open_shard(path, reader, 1, params) as writer:
         writer.write(0, record.signals, record.values)
 
 

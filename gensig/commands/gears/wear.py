@@ -35,6 +35,7 @@ from gensig.life.wear.archard import flank_radii, hunting_turns
 from gensig.life.wear.wear_case import WearCase
 from gensig.life.wear.wear_life import WearLife, hours, wear_life
 from gensig.operation.options import read_operating
+from gensig.record.inputs import InputReader
 from gensig.record.vibration_limit import WornVibration, limited_by_vibration
 from gensig.systems.wear import read_wear_case, wear_fault
 from gensig.terminal.warning_lines import one_line_warnings
@@ -61,7 +62,7 @@ def wear_life_verb(arguments: Namespace) -> int:
         speed = read_operating(config.section("operating")).speed
         if case.pair.transverse_contact_ratio < 1.0:
             _warn_of_interruption(case)
-        case, vibration = limited_by_vibration(case, config)
+        case, vibration = limited_by_vibration(case, InputReader(config))
         life = wear_life(case)
         if vibration is not None and vibration.limit_depth is not None:
             life = replace(life, ended_by="vibration")

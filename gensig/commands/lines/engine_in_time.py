@@ -9,7 +9,7 @@ import numpy as np
 
 from gensig.commands.lines.results import MPA, RPM, strength_content
 from gensig.driveline.engine_dampers import DynamicRootStress, passes_of_a_cycle
-from gensig.driveline.engine_line import EngineLine, read_engine_line
+from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.cycle_statistics import (
     fluctuations,
     order_amplitudes,
@@ -18,10 +18,10 @@ from gensig.driveline.excitation.cycle_statistics import (
 from gensig.driveline.excitation.line_torques import LineTorques
 from gensig.driveline.in_time import TimeResponse, tabulated_meshes, time_response
 from gensig.driveline.sweep import Sweep, SweepWay, sweep_response
+from gensig.driveline.teeth import ToothLaw
 from gensig.driveline.time_root_stress import typical_largest
 from gensig.errors import ConfigError
 from gensig.life.root.strength import RELIABILITY, reliability
-from gensig.options.configuration import Configuration
 from gensig.terminal.printing import show
 from gensig.units import from_si, to_si
 
@@ -32,7 +32,7 @@ WITHOUT = "_without_dampers"
 
 def simulate_time(
     line: EngineLine,
-    config: Configuration,
+    law: ToothLaw,
     torques: LineTorques,
     nodes: Sequence[int],
     duration: float,
@@ -43,7 +43,7 @@ def simulate_time(
             f"--time {duration:g}: give seconds above 0, at most {LONGEST_TIME:g}"
         )
     speed, torque = torques.speed, torques.brake_torque
-    tabulated = tabulated_meshes(line, config, speed, torque)
+    tabulated = tabulated_meshes(line, law, speed, torque)
     return time_response(
         line, speed, torque, tabulated=tabulated, nodes=nodes, duration=duration
     )
@@ -51,7 +51,7 @@ def simulate_time(
 
 def simulate_sweep(
     line: EngineLine,
-    config: Configuration,
+    law: ToothLaw,
     nodes: Sequence[int],
     given: Sequence[float],
     torque: float,
@@ -66,7 +66,7 @@ def simulate_sweep(
             f"--sweep {text}: give low and high speed in r/min "
             f"and the seconds from one to the other, at most {LONGEST_TIME:g}"
         )
-    tabulated = tabulated_meshes(line, config, 0.5 * (low + high), torque)
+    tabulated = tabulated_meshes(line, law, 0.5 * (low + high), torque)
     return sweep_response(
         line,
         low,
@@ -77,11 +77,6 @@ def simulate_sweep(
         nodes=nodes,
         n_orders=n_orders,
     )
-
-
-def without_dampers(config: Configuration) -> EngineLine:
-    """The engine of a configuration without its ``system.dampers``."""
-    return read_engine_line(config.with_keys("system", dampers=[]))
 
 
 def time_content(response: TimeResponse) -> dict[str, Any]:

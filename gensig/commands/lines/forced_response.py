@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gensig.commands.figures.engine_figures import plot_response
 from gensig.commands.lines.engine_in_time import (
+    WITHOUT,
     print_in_time,
     print_roots,
     print_sweep,
@@ -21,7 +22,6 @@ from gensig.commands.lines.engine_in_time import (
     simulate_time,
     sweep_content,
     time_content,
-    without_dampers,
 )
 from gensig.commands.lines.results import RPM, ResponseResult, spaced, speed_steps
 from gensig.commands.output import check_outputs, plain, write_outputs
@@ -36,15 +36,17 @@ from gensig.driveline.engine_dampers import (
 from gensig.driveline.engine_line import EngineLine, read_engine_line
 from gensig.driveline.excitation.engine_torques import EngineTorques
 from gensig.driveline.excitation.motor_torques import MotorDrive
+from gensig.driveline.in_time import read_tooth_law
 from gensig.driveline.linear.forced import (
     Waterfall,
     disturbance_response,
     over_cycle,
     run_of_speeds,
 )
+from gensig.driveline.teeth import ToothLaw
 from gensig.driveline.time_root_stress import root_stress_in_time
 from gensig.errors import ConfigError
-from gensig.options.configuration import Configuration
+from gensig.systems.root_strength import RootStrength
 from gensig.terminal.printing import show
 from gensig.units import from_si, to_si
 
@@ -64,18 +66,27 @@ def forced_response(arguments: Namespace) -> int:
             "excitation.pressure.file decides the torque; leave --time and --sweep out"
         )
     if arguments.time is not None:
-        response = simulate_time(
-            line, config, result.torques, result.nodes, arguments.time
-        )
-        result = replace(result, in_time=response)
+        result = _with_time(result, line, read_tooth_law(config), arguments.time)
     if arguments.mesh is not None:
         mesh = mesh_between(line, arguments.mesh)
-        roots = _roots(line, config, result, mesh, arguments.time)
+        strength = read_mesh_strength(config, line, mesh)
+        roots = _roots(strength, line, mesh, result)
+        if config["system"]["dampers"]:
+            bare = read_engine_line(config.with_keys("system", dampers=[]))
+            torques = result.torques
+            response = bare.response(torques.speed, torques.brake_torque)
+            undamped = replace(result, response=response, in_time=None)
+            if arguments.time is not None:
+                undamped = _with_time(
+                    undamped, bare, read_tooth_law(config), arguments.time
+                )
+            of_bare = _roots(strength, bare, mesh, undamped)
+            roots |= {f"{name}{WITHOUT}": root for name, root in of_bare.items()}
         result = replace(result, mesh=mesh, roots=roots)
     if arguments.sweep is not None:
         sweep = simulate_sweep(
             line,
-            config,
+            read_tooth_law(config),
             result.nodes,
             arguments.sweep,
             arguments.run_torque,
@@ -152,29 +163,22 @@ def response_content(line: EngineLine, result: ResponseResult) -> dict[str, Any]
     return {key: plain(value) for key, value in content.items()}
 
 
+def _with_time(
+    result: ResponseResult, line: EngineLine, law: ToothLaw, duration: float
+) -> ResponseResult:
+    """The result with its operating point integrated in time."""
+    response = simulate_time(line, law, result.torques, result.nodes, duration)
+    return replace(result, in_time=response)
+
+
 def _roots(
-    line: EngineLine,
-    config: Configuration,
-    result: ResponseResult,
-    mesh: int,
-    duration: float | None,
+    strength: RootStrength, line: EngineLine, mesh: int, result: ResponseResult
 ) -> dict[str, DynamicRootStress]:
-    """Root stress of a mesh, and without the dampers too where there are any."""
-    strength = read_mesh_strength(config, line, mesh)
+    """Root stress of a mesh, by the method that its forces are of."""
     load = tooth_load(line, mesh, result.response)
     roots = {"linear": dynamic_root_stress(strength, line, mesh, load)}
     if result.in_time is not None:
         roots["in_time"] = root_stress_in_time(strength, line, mesh, result.in_time)
-    if not config["system"]["dampers"]:
-        return roots
-    bare, torques = without_dampers(config), result.torques
-    load = tooth_load(bare, mesh, bare.response(torques.speed, torques.brake_torque))
-    stress = dynamic_root_stress(strength, bare, mesh, load)
-    roots["linear_without_dampers"] = stress
-    if duration is not None:
-        undamped = simulate_time(bare, config, torques, result.nodes, duration)
-        stress = root_stress_in_time(strength, bare, mesh, undamped)
-        roots["in_time_without_dampers"] = stress
     return roots
 
 

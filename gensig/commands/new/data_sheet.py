@@ -11,7 +11,7 @@ from gensig.errors import ConfigError, GensigError
 from gensig.geometry.bearing_sizes import BearingSize, bearing_for
 from gensig.geometry.contact import GearPair
 from gensig.life.root.root_stress import root_factors
-from gensig.options.configuration import Configuration, Section
+from gensig.options.configuration import Section
 from gensig.plan.request import read_request
 from gensig.systems.derived_sizes import (
     ADDENDUM,
@@ -219,11 +219,11 @@ def gear_option(sheet: DataSheet) -> GearOption:
         if sheet.is_helical:
             gear[side]["support"] |= dict.fromkeys(AXIAL_SUPPORT)
     gear = completed(Section("gear", gear)).plain()
-    center_distance = read_pair(Configuration({"gear": gear})).center_distance * 1e3
+    center_distance = read_pair(Section("gear", gear)).center_distance * 1e3
     gear["backlash_um"] = least_backlash(center_distance, sheet.module)
     for side, support in zip(SIDES, _supports(sheet, gear), strict=True):
         gear[side]["support"] |= support
-    machine = read_system(_config(sheet, gear, supports="as_given"))
+    machine = _machine(sheet, gear, supports="as_given")
     bearings = [bearing_for(2.0 * gear[side]["bore_radius_mm"]) for side in SIDES]
     return GearOption(
         gear=gear,
@@ -238,7 +238,7 @@ def _supports(sheet: DataSheet, gear: Mapping[str, Any]) -> list[dict[str, float
     origin = "bearings"
     if sheet.supports is not None:
         origin = "as_given"
-    held = read_system(_config(sheet, gear, supports=origin))
+    held = _machine(sheet, gear, supports=origin)
     supports = []
     for index, body in enumerate((held.pinion, held.wheel)):
         values = {"x": body.support.stiffness_x, "y": body.support.stiffness_y}
@@ -253,9 +253,9 @@ def _supports(sheet: DataSheet, gear: Mapping[str, Any]) -> list[dict[str, float
     return supports
 
 
-def _config(
+def _machine(
     sheet: DataSheet, gear: Mapping[str, Any], *, supports: str
-) -> Configuration:
+) -> GearPairMachine:
     words = []
     if sheet.is_helical:
         words.append("system=helical_pair")
@@ -264,11 +264,12 @@ def _config(
     config = config.with_keys(
         "operating", speed_rpm=sheet.speed, torque_nm=sheet.torque
     )
-    return config.with_keys(
+    config = config.with_keys(
         "quality",
         support_damping_ratio_low=DAMPING_RATIO,
         support_damping_ratio_high=DAMPING_RATIO,
     )
+    return read_system(config)
 
 
 def _short(value: float) -> float:

@@ -12,7 +12,7 @@ from gensig.commands.new.data_sheet import GearOption, check_positive
 from gensig.commands.new.tip_relief import tip_reliefs
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError
-from gensig.options.configuration import Configuration
+from gensig.options.configuration import Section
 from gensig.plan.request import read_request
 
 PLAIN, REALISTIC = "plain", "realistic"
@@ -157,7 +157,7 @@ def quality_lines(wishes: Wishes, grade: int) -> list[str]:
     """The group ``quality`` for a grade of ISO 1328."""
     lines = ["quality:", remarked(f"  iso1328_grade: {grade}", "given")]
     if wishes.is_realistic:
-        base = _realistic()["quality"]
+        base = _realistic("quality")
         base_grade, base_tilt = base["iso1328_grade"], base["misalignment_um"]
         tilt = base_tilt * GRADE_STEP ** (grade - base_grade)
         remark = (
@@ -191,8 +191,7 @@ class ScaledRotor:
 
 def scaled_rotor(name: str, torque: float) -> ScaledRotor:
     """The ``motor`` or the ``load`` of the realistic experiment for a torque of its shaft, N m."""
-    base = _realistic()
-    body, gear = base["system"][name], base["gear"]
+    body, gear = _realistic("system")[name], _realistic("gear")
     base_torque = gear["rated_torque_nm"]
     if name == "load":
         base_torque *= _ratio(gear)
@@ -234,7 +233,7 @@ def _ratio(gear: Mapping[str, Any]) -> float:
 
 def _housing(wishes: Wishes) -> list[str]:
     """Sensors on the housing, their path and noise cut to the sampling rate."""
-    sensing, rate = _realistic()["sensing"], wishes.rate
+    sensing, rate = _realistic("sensing"), wishes.rate
     if rate is None:
         rate = sensing["sampling_rate_hz"]
     lines = [
@@ -309,5 +308,5 @@ def _drawn(key: str, rated: float, shares: Sequence[float], given: object) -> st
     )
 
 
-def _realistic() -> Configuration:
-    return read_request([f"experiment={REALISTIC}"]).config
+def _realistic(section: str) -> Section:
+    return read_request([f"experiment={REALISTIC}"]).config.section(section)

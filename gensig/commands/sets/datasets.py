@@ -6,7 +6,7 @@ import time
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gensig.commands.console import note, step
 from gensig.commands.sets.jobs import Job, read_jobs, typed_words
@@ -23,7 +23,6 @@ from gensig.dataset.folder.manifest import read_manifest
 from gensig.dataset.folder.quick_check import absences
 from gensig.errors import ConfigError
 from gensig.options.compose import override_keys
-from gensig.options.configuration import Configuration
 from gensig.plan.request import STORED_FLAG, Request, read_request
 from gensig.terminal.printing import show, show_text
 
@@ -72,14 +71,16 @@ def _generate(
     from gensig.plan.doubts import plan_doubts
     from gensig.plan.notes import plan_notes
     from gensig.production.folder import begin_folder
+    from gensig.record.inputs import InputReader
 
     begin = time.monotonic()
     table = begin_folder(request.config, request.overrides, out)
     n_records, n_shards = table.n_records, table.n_shards
     with interruption_told(out, resumed(out)):
         if not arguments.quiet:
-            note(*request.notes, *plan_notes(request.config, table))
-            note(*plan_doubts(request.config, table))
+            reader = InputReader(request.config)
+            note(*request.notes, *plan_notes(reader, table))
+            note(*plan_doubts(reader, table))
             step(f"{out}: making {n_records} records in {n_shards} shard(s)")
         return run(
             out,
@@ -118,15 +119,15 @@ def _asked(
     overrides: Sequence[str],
     config_dir: str | None = None,
     stored: str | None = None,
-) -> Configuration | None:
-    """Configuration of a folder's recorded overrides and those typed now.
+) -> dict[str, Any] | None:
+    """Plain configuration of a folder's recorded overrides and those typed now.
 
     ``stored`` is the file of ``--config``, which takes the place of the recorded ones. None where
     the typed ones change nothing that decides bits.
     """
     words = [word for word in overrides if not _is_free(word)]
     if stored is not None:
-        return read_request(words, config_dir=config_dir, stored=stored).config
+        return read_request(words, config_dir=config_dir, stored=stored).config.plain()
     if not words:
         return None
     keys = {_key(word) for word in words}
@@ -134,8 +135,8 @@ def _asked(
     kept = [word for word in recorded if not _is_free(word) and _key(word) not in keys]
     try:
         if recorded and recorded[0].startswith(STORED_FLAG):
-            return read_request(words, config_dir=config_dir, stored=out).config
-        return read_request([*kept, *words], config_dir=config_dir).config
+            return read_request(words, config_dir=config_dir, stored=out).config.plain()
+        return read_request([*kept, *words], config_dir=config_dir).config.plain()
     except ConfigError as error:
         if config_dir is not None:
             raise
@@ -169,7 +170,7 @@ def resume(arguments: Namespace) -> int:
     asked = _asked(out, arguments.overrides)
     if manifest.is_complete and not absences(out, manifest):
         if asked is not None:
-            joined_folder(out, asked=asked.plain())
+            joined_folder(out, asked=asked)
         return _print_complete(
             out, manifest.n_failed, manifest.n_records, quiet=arguments.quiet
         )
@@ -243,20 +244,21 @@ def _plan(job: Job, *, freeze: bool) -> None:
     from gensig.plan.notes import plan_notes
     from gensig.production.folder import begin_folder
     from gensig.production.prediction import predict
+    from gensig.record.inputs import InputReader
 
-    config, out = job.request.config, job.folder
+    reader, out = InputReader(job.request.config), job.folder
     if freeze and out is not None:
-        begin_folder(config, job.request.overrides, out)
+        begin_folder(reader.config, job.request.overrides, out)
         show(
             f"{out} is planned; gensig resume {out} makes it here, "
             "tasks with executor=slurm as an array job"
         )
 
     def on_plan(table: Plan, n_timed: int) -> None:
-        note(*job.request.notes, *plan_notes(config, table))
-        note(*plan_doubts(config, table))
+        note(*job.request.notes, *plan_notes(reader, table))
+        note(*plan_doubts(reader, table))
         step(f"making {n_timed} of {table.n_records} records to time them")
 
-    for name, value in predict(config, on_plan=on_plan).items():
+    for name, value in predict(reader, on_plan=on_plan).items():
         first, *others = value.split("\n")
         show(f"{name:<11}{first}", *[f"{'':<11}{other}" for other in others])

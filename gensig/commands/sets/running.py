@@ -14,11 +14,11 @@ from gensig.commands.console import remark
 from gensig.dataset.folder.failures import commonest, failure_reasons
 from gensig.dataset.folder.manifest import read_manifest
 from gensig.errors import Interrupted
-from gensig.options.configuration import Configuration
 from gensig.terminal.printing import show
 from gensig.terminal.run_progress import RunProgress
 
 if TYPE_CHECKING:
+    from gensig.dataset.folder.layout import ConfigContent
     from gensig.execution.base import Executor
     from gensig.production.maker import Maker
 
@@ -30,7 +30,7 @@ def run(
     *,
     n_records: int,
     begin: float,
-    asked: Configuration | None = None,
+    asked: ConfigContent | None = None,
     of_task: bool = False,
     maker: Maker | None = None,
 ) -> int:

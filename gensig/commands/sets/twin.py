@@ -11,10 +11,10 @@ from gensig.commands.console import step
 from gensig.commands.figures.twin_figure import plot_twin
 from gensig.commands.new.data_sheet import check_positive
 from gensig.errors import ConfigError
-from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
 from gensig.signals.mesh_motion import Teeth
 from gensig.signals.recording import Recording
+from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.registry import SIDES, read_system
 from gensig.terminal.printing import show
 from gensig.twin.check import check, held_out_duration
@@ -46,7 +46,7 @@ def twin(arguments: Namespace) -> int:
     torque, torque_from = _torque(arguments, gear)
     fitted_part, held_out, held_out_name = _split(recording, arguments)
     teeth = Teeth(driving=arguments.teeth[0], driven=arguments.teeth[1])
-    system = read_system(_config(gear, torque, arguments.speed))
+    system = _machine(gear, torque, arguments.speed)
     fitted = fit(fitted_part, system, arguments.speed, step)
     speed = 60.0 * fitted.motion.mesh_frequency / teeth.driving
     gear = {**gear, "rated_speed_rpm": round(speed, 4), "rated_torque_nm": torque}
@@ -181,6 +181,6 @@ def _torque(arguments: Namespace, gear: dict[str, Any]) -> tuple[float, str]:
     )
 
 
-def _config(gear: dict[str, Any], torque: float, speed: float) -> Configuration:
+def _machine(gear: dict[str, Any], torque: float, speed: float) -> GearPairMachine:
     config = read_request([]).config.with_entries(gear=gear)
-    return config.with_keys("operating", torque_nm=torque, speed_rpm=speed)
+    return read_system(config.with_keys("operating", torque_nm=torque, speed_rpm=speed))

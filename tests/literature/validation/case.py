@@ -20,7 +20,7 @@ from gensig.material import Material
 from gensig.mesh.pair_table import PairTable, pair_table
 from gensig.options.compose import compose
 from gensig.options.configuration import Configuration
-from gensig.systems.registry import read_spur_pair
+from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
 
 Array = NDArray[np.float64]
@@ -115,7 +115,7 @@ def read_case(overrides: tuple[str, ...]) -> Case:
 def _read_machine(overrides: tuple[str, ...]) -> SpurPair:
     keys = [word.partition("=")[0] for word in overrides]
     if not all("." in key and not key.startswith("gear.rated_") for key in keys):
-        return read_spur_pair(
+        return read_system(
             compose("generate", overrides)
         )  # groups, and values that others are made of
     values = _default_machine().plain()
@@ -127,7 +127,7 @@ def _read_machine(overrides: tuple[str, ...]) -> SpurPair:
         if last not in place:
             raise ConfigError(f"'{word}': the machine has no key '{key}'")
         place[last] = yaml.safe_load(word.partition("=")[2])
-    return read_spur_pair(Configuration(values))
+    return read_system(Configuration(values))
 
 
 @lru_cache(maxsize=1)

@@ -12,7 +12,7 @@ from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 from gensig.systems.hot_pair import Duty, as_configured, hot_state
-from gensig.systems.registry import read_heat
+from gensig.systems.registry import PairParts
 
 SHORT = ("operating.duration_s=0.02", "mesh.points_per_pitch=64", "mesh.n_slices=6")
 BOXES = ("two_stage_gearbox", "phm09_helical_two_stage")
@@ -35,7 +35,7 @@ def duty_of(cold, heat):
 @pytest.mark.parametrize("box", BOXES)
 def test_the_followed_mesh_is_as_hot_as_a_pair(box):
     cold, hot = line(f"system={box}"), line(f"system={box}", HOT)
-    duty = duty_of(cold, read_heat(config_of(HOT)))
+    duty = duty_of(cold, PairParts(config_of(HOT)).heat)
     growth = hot.heat[hot.mesh_number].growth
     expected = hot_state(duty).growth
     assert_close(growth.pinion.tooth, expected.pinion.tooth, 1e-12)

@@ -11,7 +11,7 @@ from closeness import assert_close
 from engine_cases import SPEED, TORQUE
 
 from gensig.driveline.engine_line import read_engine_line
-from gensig.driveline.in_time import tabulated_meshes
+from gensig.driveline.in_time import read_tooth_law, tabulated_meshes
 from gensig.driveline.mesh_phase import first_slice_lead, start_phase, start_rolls
 from gensig.driveline.running import Governor, running_line, steady_course
 from gensig.driveline.teeth import ToothStart, neighbours, tooth_there
@@ -73,7 +73,7 @@ def running(lateral, teeth):
         ]
     ).config
     engine = read_engine_line(config)
-    tabulated = tabulated_meshes(engine, config, SPEED, TORQUE)
+    tabulated = tabulated_meshes(engine, read_tooth_law(config), SPEED, TORQUE)
     course = steady_course(SPEED, TORQUE)
     line = running_line(engine, course, governor=GOVERNOR, tabulated=tabulated)
     channels = [("speed", line.dof(14))]

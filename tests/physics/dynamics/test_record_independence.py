@@ -35,7 +35,7 @@ def rows(config):
 def simulated(config, rows):
     """Records of rows, one after the other, in a process without any twin."""
     records.forget_twins()
-    return [simulate_record(config, row) for row in rows]
+    return [simulate_record(InputReader(config), row) for row in rows]
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def test_records_are_independent_in_any_order_and_block(config, rows, in_order, 
         result = []
         for first in range(0, 8, size):
             block = [rows[index] for index in ORDER[first : first + size]]
-            result += simulate_records(config, block)
+            result += simulate_records(InputReader(config), block)
         assert_same(result, expected)
         records.forget_twins()
     assert bits(in_order[5]) != bits(in_order[4])
@@ -84,10 +84,10 @@ def test_what_was_read_before_leaves_another_set_as_it_is(config, rows, word):
     first, other = teeth(config), teeth(another)
     assert other != first
     assert teeth(config) == first
-    simulate_record(config, rows[0])  # with the twin that sets its noise
+    simulate_record(InputReader(config), rows[0])  # with the twin that sets its noise
     row = make_plan(another).record(0)
     assert row["condition_id"] == rows[0]["condition_id"]
-    assert_same([simulate_record(another, row)], simulated(another, [row]))
+    assert_same([simulate_record(InputReader(another), row)], simulated(another, [row]))
 
 
 def test_a_failure_leaves_its_block(config, rows, in_order):
@@ -97,7 +97,7 @@ def test_a_failure_leaves_its_block(config, rows, in_order):
         "params/operating.drive_frequency_hz": 1e6,
     }
     records.forget_twins()
-    result = simulate_records(config, [*rows[:2], stiff, rows[3]])
+    result = simulate_records(InputReader(config), [*rows[:2], stiff, rows[3]])
     failed = result.pop(2)
 
     assert_same(result, [in_order[index] for index in (0, 1, 3)])
@@ -108,7 +108,7 @@ def test_a_failure_leaves_its_block(config, rows, in_order):
 
 def test_a_row_keeps_its_record_in_a_longer_plan(config, rows, in_order):
     row = {**rows[2], "shard": 7, "row": 3}
-    assert_same([simulate_record(config, row)], [in_order[2]])
+    assert_same([simulate_record(InputReader(config), row)], [in_order[2]])
 
 
 class TestNoise:
@@ -118,7 +118,7 @@ class TestNoise:
             "params/sensing.snr_db": 0.0,
             "snr_db": 0.0,
         }
-        loud = simulate_record(config, louder)
+        loud = simulate_record(InputReader(config), louder)
         quiet = in_order[3]
 
         assert clean(loud).tobytes() == clean(quiet).tobytes()
@@ -151,8 +151,7 @@ class TestNoise:
             "faults_json": "[]",
         }
         result = simulate_record(
-            config.with_keys("operating", duration_s=0.5),
-            healthy,
+            InputReader(config.with_keys("operating", duration_s=0.5)), healthy
         )
         noise = result.signals["acceleration"].astype(float) - clean(result)
         power = np.var(noise, axis=1)
@@ -165,13 +164,17 @@ class TestNoise:
     def test_without_noise_it_is_the_clean_signal(self, config, rows):
         row = dict(rows[1])
         del row["params/sensing.snr_db"]
-        result = simulate_record(config.with_keys("sensing", snr_db=None), row)
+        result = simulate_record(
+            InputReader(config.with_keys("sensing", snr_db=None)), row
+        )
         assert result.signals["acceleration"].tobytes() == clean(result).tobytes()
 
 
 def test_a_sham_record_is_healthy_under_its_label(config, rows, in_order):
     index = next(k for k in range(8) if rows[k]["label_name"] == "missing_tooth")
-    sham = simulate_record(config.with_keys("plan", sham=True), rows[index])
+    sham = simulate_record(
+        InputReader(config.with_keys("plan", sham=True)), rows[index]
+    )
     labels = [
         result.signals["fault_multihot"].tolist() for result in (sham, in_order[index])
     ]

@@ -8,6 +8,7 @@ from closeness import assert_close
 
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_records
 from gensig.systems.base import simulate_together
 from gensig.systems.lead_in import simulate_with_lead_in
@@ -147,7 +148,7 @@ class TestStored:
         return list(
             zip(
                 rows,
-                simulate_records(config, rows),
+                simulate_records(InputReader(config), rows),
                 strict=True,
             )
         )

@@ -120,7 +120,7 @@ def test_it_is_what_a_data_set_stores():
         "start_tooth_wheel": start.tooth_wheel,
         "start_phase": start.phase,
     }
-    record = simulate_record(config, {**row, **begin})
+    record = simulate_record(InputReader(config), {**row, **begin})
     cell = pairs.cell(1)
     power = cell.noise_power[2]
     result = np.sqrt(np.sum(cell.residual[2] ** 2) / power[0])

@@ -12,6 +12,7 @@ from gensig.cli import main
 from gensig.life.wear.wear_life import wear_life
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_record
 from gensig.record.vibration_limit import ROW, limited_by_vibration
 from gensig.systems.wear import read_wear_case, wear_fault
@@ -125,7 +126,7 @@ def config_of(*words):
 
 def limited(*words):
     config = config_of(*words)
-    return limited_by_vibration(read_wear_case(config), config)
+    return limited_by_vibration(read_wear_case(config), InputReader(config))
 
 
 @pytest.fixture(scope="module")
@@ -142,7 +143,7 @@ def recorded_rms(depth, case):
     config = config.with_entries(classes={"worn": wear_fault(case, depth)})
     start = {key: value for key, value in ROW.items() if key.startswith("start")}
     row = {**make_plan(config).record(0), **start}
-    clean = simulate_record(config, row).signals["acceleration_clean"]
+    clean = simulate_record(InputReader(config), row).signals["acceleration_clean"]
     return np.std(clean.astype(np.float64), axis=1)
 
 
@@ -179,12 +180,12 @@ def test_a_limit_in_m_per_s2_is_of_the_loudest_sensor_and_the_first_of_both_coun
 def test_a_limit_that_is_not_reached_leaves_the_life_as_it_was():
     config = config_of("wear.vibration_rise_db=80")
     case = read_wear_case(config)
-    same, vibration = limited_by_vibration(case, config)
+    same, vibration = limited_by_vibration(case, InputReader(config))
     assert same is case
     assert vibration.limit_depth is None
     assert vibration.depth[-1] == pytest.approx(case.options.threshold, rel=1e-6)
     without = replace(case, options=replace(case.options, vibration_rise=None))
-    assert limited_by_vibration(without, config) == (without, None)
+    assert limited_by_vibration(without, InputReader(config)) == (without, None)
 
 
 def test_vibration_ends_a_life_and_its_flanks_are_an_option(
@@ -226,7 +227,7 @@ def test_lives_of_a_data_set_end_at_the_depth_found():
     )
     config = read_request(words.split()).config
     sound = config.with_entries(fault={"kind": "healthy"})
-    _, vibration = limited_by_vibration(read_wear_case(sound), config)
+    _, vibration = limited_by_vibration(read_wear_case(sound), InputReader(config))
     assert 0.0 < vibration.limit_depth < 99e-6
     plan = make_plan(config)
     assert plan.columns["life_failed"].tolist() == [1] * 6

@@ -8,6 +8,7 @@ import numpy as np
 from gensig.cli import main
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import forget_twins, simulate_records
 
 
@@ -19,7 +20,7 @@ def records(*overrides):
     plan = make_plan(config)
     rows = [plan.record(place) for place in range(plan.n_records)]
     forget_twins()
-    return config, rows, simulate_records(config, rows)
+    return config, rows, simulate_records(InputReader(config), rows)
 
 
 def run(*words):

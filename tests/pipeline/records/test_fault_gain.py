@@ -12,6 +12,7 @@ from gensig.errors import ConfigError, SimulationError
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record import inputs
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import Record, forget_twins, simulate_records
 
 SMALL = (
@@ -42,7 +43,7 @@ def records(*words: str, gain: float | None = None, sham: bool = False) -> list[
     plan = make_plan(config)
     forget_twins()
     rows = [plan.record(index) for index in range(plan.n_records)]
-    return simulate_records(config.with_keys("plan", sham=sham), rows)
+    return simulate_records(InputReader(config.with_keys("plan", sham=sham)), rows)
 
 
 def is_healthy(record: Record) -> bool:

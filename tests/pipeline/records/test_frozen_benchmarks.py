@@ -6,6 +6,7 @@ import pytest
 from diagnose.studies.benchmark import RTOL, frozen_benchmarks
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_records
 
 N_RECORDS = 3
@@ -17,7 +18,9 @@ def test_signals_are_those_that_were_frozen(benchmark):
     plan = make_plan(config)
     names = list(benchmark.signal_rms)[:N_RECORDS]
     rows = [plan.record(int(name.removeprefix("r"))) for name in names]
-    for name, record in zip(names, simulate_records(config, rows), strict=True):
+    for name, record in zip(
+        names, simulate_records(InputReader(config), rows), strict=True
+    ):
         signals = np.square(record.signals["acceleration"], dtype=float)
         rms = np.sqrt(signals.mean(axis=-1))
         assert record.values["record_id"] == name

@@ -13,6 +13,7 @@ from gensig.errors import ConfigError, SimulationError
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record import inputs
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import forget_twins, simulate_records
 from gensig.record.streams import Stream, stream
 
@@ -48,7 +49,7 @@ def plan_of(*overrides: str) -> tuple:
 def records(*overrides: str, sham: bool = False) -> list:
     config, rows = plan_of(*overrides)
     forget_twins()
-    return simulate_records(config.with_keys("plan", sham=sham), rows)
+    return simulate_records(InputReader(config.with_keys("plan", sham=sham)), rows)
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +117,7 @@ def test_a_record_and_its_twin_are_the_same_alone_and_among_others(
     config, rows = plan_of(*REALISTIC)
     for index in (3, 0):
         forget_twins()
-        (alone,) = simulate_records(config, [rows[index]])
+        (alone,) = simulate_records(InputReader(config), [rows[index]])
         assert {"tacho", "encoder_angle", "healthy_twin"} <= set(alone.signals)
         for name, values in alone.signals.items():
             assert_array_equal(values, realistic[index].signals[name])

@@ -37,7 +37,7 @@ def made(*words):
     config = read_request([*SHORT, *words]).config
     plan = make_plan(config)
     rows = [plan.record(number) for number in range(plan.n_records)]
-    records = simulate_records(config, rows)
+    records = simulate_records(InputReader(config), rows)
     assert not any("status" in record.values for record in records)  # none failed
     names = [row["label_name"] for row in rows]
     return read_machine(config), dict(zip(names, records, strict=True))

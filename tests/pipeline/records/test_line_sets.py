@@ -14,6 +14,7 @@ from gensig.dataset.reader import open_dataset
 from gensig.errors import DatasetError
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_record
 from gensig.report.rotation_frequencies import read_rotation
 
@@ -163,14 +164,15 @@ def test_labels_units_and_columns_name_gear_tooth_and_shaft(made):
 def test_a_record_depends_on_its_row_alone_and_a_sham_has_no_fault(made):
     config = read_request([*made.line.words]).config
     row = made.row_of("broken")
-    again = simulate_record(config, row).signals["acceleration"]
+    again = simulate_record(InputReader(config), row).signals["acceleration"]
     assert_array_equal(again, made.stored(row))
     without = config.with_keys("plan", sham=True)
     faulty = [made.row_of(name) for name in made.line.classes if name != "healthy"]
     # in so short a record some of the faulty teeth never come into mesh
     assert any(
         not np.array_equal(
-            simulate_record(without, row).signals["acceleration"], made.stored(row)
+            simulate_record(InputReader(without), row).signals["acceleration"],
+            made.stored(row),
         )
         for row in faulty
     )

@@ -49,7 +49,7 @@ def rows_of(config):
 
 def made(config):
     forget_twins()
-    return simulate_records(config, rows_of(config))
+    return simulate_records(InputReader(config), rows_of(config))
 
 
 @pytest.fixture(scope="module")

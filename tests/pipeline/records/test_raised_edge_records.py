@@ -8,6 +8,7 @@ from record_sets import refused, run
 
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import forget_twins, simulate_records
 from gensig.signals.indicators import kurtosis, rms
 
@@ -30,8 +31,7 @@ def record(*overrides, sham=False):
     plan = make_plan(config)
     forget_twins()
     (made,) = simulate_records(
-        config.with_keys("plan", sham=sham),
-        [plan.record(0)],
+        InputReader(config.with_keys("plan", sham=sham)), [plan.record(0)]
     )
     return made
 

@@ -9,6 +9,7 @@ from gensig.dataset.folder.verify import verify
 from gensig.plan.request import read_request
 from gensig.production.prediction import predict
 from gensig.production.streaming import open_stream
+from gensig.record.inputs import InputReader
 
 WORDS = ("plan.n_units=3", "plan.machines=separate", "plan.n_reference=2")
 N_EXAMPLES = 6
@@ -58,7 +59,9 @@ def test_card_and_plan_tell_both_numbers(folders):
     assert "| records | 12: 6 examples, 6 reference records in no split |" in card
     assert "| healthy | 3 | 0 |" in card
     words = ["plan.n_records=6", "plan.classes=[healthy,crack]", *WORDS]
-    facts = predict(read_request([*words, "operating.duration_s=0.02"]).config)
+    facts = predict(
+        InputReader(read_request([*words, "operating.duration_s=0.02"]).config)
+    )
     assert facts["records"] == "6"
     assert facts["references"] == "6 more (2 a machine, healthy, in no split)"
     assert sorted(facts["classes"].split(", ")) == ["crack 3", "healthy 3"]

@@ -11,7 +11,7 @@ from gensig.driveline.drive_line import read_drive_line
 from gensig.options.groups import options
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
-from gensig.systems.registry import read_pair
+from gensig.systems.registry import PairParts
 
 INTERRUPTED = "harbin_38_55"  # contact ratio below 1, as its paper prints it
 DAMPING = (
@@ -72,7 +72,7 @@ def test_the_mesh_of_shipped_gears_stands_out(name):
 
 
 def test_the_test_pair_has_the_centre_distance_and_tips_of_its_rig():
-    pair = read_pair(read_request(["gear=fzg_c_16_24"]).config)
+    pair = PairParts(read_request(["gear=fzg_c_16_24"]).config).pair
     assert pair.center_distance == pytest.approx(91.5e-3, rel=1e-4)
     assert 2e3 * pair.pinion.tip_radius == pytest.approx(82.46, abs=0.02)
     assert 2e3 * pair.wheel.tip_radius == pytest.approx(118.36, abs=0.02)

@@ -12,8 +12,9 @@ from benchmarks import _realism_sets as sets
 from benchmarks import _realism_values as values
 from benchmarks import realism
 from gensig.errors import ConfigError, DatasetError
-from gensig.plan.make import read_counts
+from gensig.plan.make import count_records
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
 from gensig.report.realism import read_ranges
 
 BASE = ["experiment=quickstart", "executor.n_workers=1"]
@@ -124,7 +125,7 @@ class TestValues:
 class TestSets:
     def test_the_grid_runs_every_unit_at_every_set_point_with_every_class(self):
         config = read_request(sets.yardstick_words(BASE, sets.Size())).config
-        counts = read_counts(config)
+        counts = count_records(InputReader(config))
         assert (counts.n_units, counts.n_conditions, counts.n_records) == (40, 240, 960)
         vary = config["plan"]["vary"]
         assert vary["operating.speed_rpm"]["values"] == [600, 1200, 1800]

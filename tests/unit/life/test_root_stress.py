@@ -22,7 +22,7 @@ from gensig.life.root.root_stress import (
 )
 from gensig.options.compose import compose
 from gensig.options.groups import options
-from gensig.systems.registry import read_pair
+from gensig.systems.registry import PairParts
 from gensig.systems.root_strength import read_root_strength
 
 PUMP = "gear=engine_pump_drive"
@@ -41,7 +41,7 @@ def case(*words):
 
 
 def pair(*words):
-    return read_pair(compose("generate", list(words)))
+    return PairParts(compose("generate", list(words))).pair
 
 
 def test_a_force_gives_the_stress_it_was_asked_for():

@@ -16,7 +16,7 @@ from gensig.mesh.thermal.body_heat import (
     uniform_body,
 )
 from gensig.options.compose import compose
-from gensig.systems.registry import read_heat, read_pair
+from gensig.systems.registry import PairParts
 
 WORDS = [
     "system=helical_pair",
@@ -27,12 +27,12 @@ WORDS = [
 
 @pytest.fixture(scope="module")
 def gear():
-    return read_pair(compose("generate", WORDS)).pinion
+    return PairParts(compose("generate", WORDS)).pair.pinion
 
 
 @pytest.fixture(scope="module")
 def heat():
-    return read_heat(compose("generate", WORDS))
+    return PairParts(compose("generate", WORDS)).heat
 
 
 @pytest.mark.parametrize("bore", [None, 65.0, 90.0])

@@ -11,7 +11,7 @@ from gensig.mesh.sliced.component_sum import (
 )
 from gensig.mesh.sliced.slices import single_pair_stiffness
 from gensig.options.compose import compose
-from gensig.systems.registry import read_cold_pair
+from gensig.systems.registry import PairParts
 
 WORDS = (
     "system=helical_pair",
@@ -26,7 +26,7 @@ WORDS = (
 def stiffness(contact, n_slices, *words):
     """Both stiffnesses of one pair along its way, (literal, slice by slice)."""
     options = f"mesh.contact={contact}", f"mesh.n_slices={n_slices}", *words
-    flanks = read_cold_pair(compose("generate", [*WORDS, *options]))
+    flanks = PairParts(compose("generate", [*WORDS, *options])).cold_flanks
     position, by_slices = flanks.single_pair(101)
     mesh = flanks.sliced_mesh()
     components = component_compliances(mesh, flanks.material, None)
@@ -51,7 +51,7 @@ def test_sums_of_components_are_never_softer(contact):
 
 
 def test_pairs_in_contact_add_up():
-    flanks = read_cold_pair(compose("generate", [*WORDS, "mesh.contact=linear"]))
+    flanks = PairParts(compose("generate", [*WORDS, "mesh.contact=linear"])).cold_flanks
     mesh = flanks.sliced_mesh()
     components = component_compliances(mesh, flanks.material, None)
     pitch, roll = flanks.pair.base_pitch, np.array([0.3, 0.8]) * flanks.pair.base_pitch

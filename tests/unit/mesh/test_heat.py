@@ -18,14 +18,14 @@ from gensig.mesh.thermal.heat import (
     rolling_speeds,
 )
 from gensig.options.compose import compose
-from gensig.systems.registry import read_duty, read_heat
+from gensig.systems.registry import PairParts
 
 SPEED = 125.0
 
 
 @pytest.fixture(scope="module")
 def duty():
-    return read_duty(
+    return PairParts(
         compose(
             "generate",
             [
@@ -34,7 +34,7 @@ def duty():
                 "heat=chongqing_rated",
             ],
         )
-    )
+    ).duty
 
 
 def flash(duty, position, load, *, friction=0.05, speed=SPEED):
@@ -219,7 +219,7 @@ def test_modulus_falls_by_three_per_cent_in_a_hundred_kelvin(duty):
 )
 def test_inputs_that_make_no_heat_are_refused(words, error, message):
     with pytest.raises(error) as caught:
-        read_heat(compose("generate", words))
+        _ = PairParts(compose("generate", words)).heat
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -234,4 +234,4 @@ def test_a_pair_that_stands_still_is_not_heated():
         ConfigError,
         match=r"operating.speed_rpm = 0 must be positive",
     ):
-        read_duty(compose("generate", words))
+        _ = PairParts(compose("generate", words)).duty

@@ -13,7 +13,7 @@ from gensig.mesh.modification import (
     sound_teeth,
 )
 from gensig.options.compose import compose
-from gensig.systems.registry import read_modification, read_pair
+from gensig.systems.registry import PairParts
 
 MICRO = 1e-6
 MILLI = 1e-3
@@ -21,7 +21,7 @@ MILLI = 1e-3
 
 @pytest.fixture(scope="module")
 def pair():
-    return read_pair(compose("generate", ["system=helical_pair"]))
+    return PairParts(compose("generate", ["system=helical_pair"])).pair
 
 
 def of_pair(**sides):
@@ -47,7 +47,7 @@ def test_every_pair_has_its_own_modified_teeth():
     relieved = FlankModification(tip_relief=8 * MICRO, tip_relief_height=0.5 * MILLI)
     modification = of_pair(pinion=relieved)
     for gear in ("xiamen_23_84", "fzg_c_16_24", "xiamen_23_84"):
-        pair = read_pair(compose("generate", [f"gear={gear}"]))
+        pair = PairParts(compose("generate", [f"gear={gear}"])).pair
         teeth = sound_teeth(pair, modification)
         assert {side: tooth.gear for side, tooth in teeth.items()} == pair.gears
 
@@ -175,7 +175,7 @@ def test_any_size_of_either_gear_is_a_modification(side, size):
 )
 def test_keys_that_make_no_flank_are_refused(changes, message):
     with pytest.raises(ConfigError) as caught:
-        read_modification(compose("generate", changes))
+        _ = PairParts(compose("generate", changes)).modification
     assert message in str(caught.value)
 
 

@@ -27,7 +27,7 @@ from gensig.mesh.thermal.paper_growth import (
 )
 from gensig.mesh.thermal.paper_teeth import TERMS, paper_terms
 from gensig.options.compose import compose
-from gensig.systems.registry import read_cold_pair
+from gensig.systems.registry import PairParts
 
 EXPANSION, NU = 12e-6, 0.3
 RIGHT = Reading(has_printed_body=False)
@@ -37,7 +37,7 @@ SIDES = ("pinion", "wheel")
 @pytest.fixture(scope="module")
 def flanks():
     """The paper's pair by its conventions."""
-    return read_cold_pair(
+    return PairParts(
         compose(
             "generate",
             [
@@ -48,7 +48,7 @@ def flanks():
                 "mesh.allow_extrapolation=true",
             ],
         )
-    )
+    ).cold_flanks
 
 
 def grown(gear, reading=RIGHT, bore_rise=100.0, tooth_rise=100.0):

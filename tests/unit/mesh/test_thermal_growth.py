@@ -10,7 +10,7 @@ from gensig.geometry.tooth_profile import involute_point, load_angle
 from gensig.mesh.thermal.body_heat import solved_body
 from gensig.mesh.thermal.thermal_growth import GearGrowth, PairGrowth
 from gensig.options.compose import compose
-from gensig.systems.registry import read_heat, read_pair
+from gensig.systems.registry import PairParts
 
 WORDS = [
     "system=helical_pair",
@@ -21,7 +21,7 @@ WORDS = [
 
 @pytest.fixture(scope="module")
 def pair():
-    return read_pair(compose("generate", WORDS))
+    return PairParts(compose("generate", WORDS)).pair
 
 
 def flank(pair, gear):
@@ -83,7 +83,7 @@ def test_uneven_heat_moves_every_point_of_the_flank(pair, tooth, body):
 def test_the_rim_grows_as_the_paper_s_equations_5_and_9_say(pair):
     """Eq. (5) integrated numerically and eq. (9), its closed form for the logarithmic field."""
     gear = pair.pinion
-    heat = read_heat(compose("generate", WORDS))
+    heat = PairParts(compose("generate", WORDS)).heat
     insulated = replace(heat, face_convection=0.0)
     body = solved_body(gear, 6000.0, insulated, bore_temperature=50.0)
     inner = gear.bore_radius

@@ -9,13 +9,14 @@ from gensig.options.compose import options
 from gensig.plan.doubts import plan_doubts
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
 
 SMALL = ("plan.n_records=4",)
 
 
 def doubts(*words):
     config = read_request([*SMALL, *words]).config
-    return plan_doubts(config, make_plan(config))
+    return plan_doubts(InputReader(config), make_plan(config))
 
 
 DOUBTED = {
@@ -67,7 +68,7 @@ def test_no_shipped_experiment_is_doubted(name):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         config = read_request([f"experiment={name}"]).config
-        texts = plan_doubts(config, make_plan(config))
+        texts = plan_doubts(InputReader(config), make_plan(config))
     assert len(texts) == (name in LOW_BREAKS)
     assert all("fault=broken: its tooth touches nothing" in text for text in texts)
 

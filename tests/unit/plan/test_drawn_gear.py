@@ -13,6 +13,7 @@ from gensig.errors import FaultError
 from gensig.plan.draws import drawn_gears
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
 from gensig.record.machines import read_machine
 
 CLASSES = ("crack", "pitting", "missing_tooth", "compound")
@@ -169,8 +170,10 @@ def test_lives_of_an_engine_grow_on_its_spur_gears():
     words = ("experiment=engine_broken_tooth", "life=crack_growth", DRAWN)
     config = read_request(list(words)).config
     gears = read_machine(config).gears
-    assert all(gears[name].helix_angle == 0.0 for name in drawn_gears(config))
-    assert set(GEARS) <= set(drawn_gears(config)) < set(gears)
+    assert all(
+        gears[name].helix_angle == 0.0 for name in drawn_gears(InputReader(config))
+    )
+    assert set(GEARS) <= set(drawn_gears(InputReader(config))) < set(gears)
 
 
 def test_turns_of_the_faulted_gear_are_those_of_the_slower_one():

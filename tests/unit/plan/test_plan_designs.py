@@ -14,6 +14,7 @@ from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
 from gensig.plan.make import describe_design, make_plan
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_records
 from gensig.record.streams import Stream, stream
 
@@ -126,14 +127,14 @@ class TestGrid:
 
     def test_it_can_be_told_in_words(self, configured):
         config = configured({"crack": {"crack_depth_mm": DEPTH}}, **GRID, vary=VARY)
-        grid, drawn = describe_design(config).split("; ")
+        grid, drawn = describe_design(InputReader(config)).split("; ")
         sizes = "operating.speed_rpm 3 x operating.torque_nm 4 x crack.crack_depth_mm 3"
         assert grid == f"grid of {sizes}"
         keys = "crack.tooth, pitting.tooth, pitting.pit_length_mm, pitting.pit_width_mm"
         assert drawn == f"drawn: {keys}, missing_tooth.tooth"
-        bare = describe_design(configured(**GRID, vary={}))
+        bare = describe_design(InputReader(configured(**GRID, vary={})))
         assert bare.startswith("grid of no key; drawn: ")
-        assert describe_design(configured(design="sobol")) == "sobol"
+        assert describe_design(InputReader(configured(design="sobol"))) == "sobol"
 
     @pytest.mark.parametrize(
         ("plan", "text"),
@@ -252,7 +253,9 @@ class TestRepeats:
         config = config.with_keys("operating", duration_s=0.02)
         config = config.with_keys("dataset", store_clean=True)
         plan = make_plan(config)
-        records = simulate_records(config, [plan.record(index) for index in range(2)])
+        records = simulate_records(
+            InputReader(config), [plan.record(index) for index in range(2)]
+        )
         powers, signals, clean = (
             [record.signals[name] for record in records]
             for name in ("noise_power", "acceleration", "acceleration_clean")

@@ -5,6 +5,7 @@ import pytest
 from gensig.plan.make import make_plan
 from gensig.plan.notes import plan_notes
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
 
 FOUR = "plan.classes=[healthy,crack,pitting,missing_tooth]"
 THREE = "plan.classes=[healthy,crack,missing_tooth]"
@@ -13,7 +14,7 @@ SPEEDS = "plan.vary={operating.speed_rpm:{distribution:uniform,low:1200,high:240
 
 def said(*words):
     config = read_request([*words, "operating.duration_s=0.02"]).config
-    return plan_notes(config, make_plan(config))
+    return plan_notes(InputReader(config), make_plan(config))
 
 
 def test_units_without_a_record_are_told():

@@ -15,6 +15,7 @@ from gensig.errors import ConfigError, GensigError
 from gensig.options.configuration import Configuration
 from gensig.plan.make import make_plan, record_bytes, records_per_shard
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
 
 CLASSES = ("healthy", "crack", "pitting", "missing_tooth")
 SHARED = (
@@ -246,21 +247,21 @@ class TestRefusals:
     [(1, 24), (400, 24), (24_000, 24), (24_001, 32), (100_000, 104), (600_000, 600)],
 )
 def test_shards_grow_with_the_set(config_with, n_records, together):
-    assert records_per_shard(config_with(), n_records) == together
+    assert records_per_shard(InputReader(config_with()), n_records) == together
     assert n_records <= 1000 * together
     given = config_with({"dataset.records_per_shard": 7})
-    assert records_per_shard(given, n_records) == 7
+    assert records_per_shard(InputReader(given), n_records) == 7
 
 
 @pytest.mark.parametrize("n_records", [400, 10**8])
 def test_a_shard_holds_at_most_500_mb_of_samples(config_with, n_records):
     long = config_with({"operating.duration_s": 100.0, "dataset.store_clean": True})
-    assert record_bytes(config_with()) == 4 * 4 * 51200
-    assert record_bytes(long) == 2 * 100 * 4 * 4 * 51200
+    assert record_bytes(InputReader(config_with())) == 4 * 4 * 51200
+    assert record_bytes(InputReader(long)) == 2 * 100 * 4 * 4 * 51200
     for config in (config_with(), long):
-        n_bytes = record_bytes(config)
-        together = records_per_shard(config, n_records)
+        n_bytes = record_bytes(InputReader(config))
+        together = records_per_shard(InputReader(config), n_records)
         assert together * n_bytes <= 5 * 10**8
         assert together == 24 or (together + 8) * n_bytes > 5 * 10**8
-    million = records_per_shard(config_with(), 10**6)
+    million = records_per_shard(InputReader(config_with()), 10**6)
     assert 1000 <= 10**6 / million <= 2000

@@ -11,7 +11,7 @@ from gensig.errors import GensigError
 from gensig.faults.registry import read_faults
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.record.inputs import row_faults
+from gensig.record.inputs import InputReader, row_faults
 from gensig.record.simulate import simulate_record
 from gensig.systems.pair_machine import severity
 from gensig.systems.registry import read_system
@@ -127,7 +127,9 @@ class TestManyKindsOfFaults:
         short = short.with_keys("sensing", snr_db=None)
 
         def of_row(row, **classes):
-            record = simulate_record(short.with_keys("classes", **classes), row)
+            record = simulate_record(
+                InputReader(short.with_keys("classes", **classes)), row
+            )
             return {MIXED[k] for k in np.flatnonzero(record.signals["fault_multihot"])}
 
         return of_row

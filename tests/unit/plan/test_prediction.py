@@ -12,6 +12,8 @@ from gensig.plan.request import read_request
 from gensig.production.prediction import FailedRecordsWarning, predict
 from gensig.production.shard_writing import block_length
 from gensig.record import inputs as records
+from gensig.record.inputs import InputReader
+from gensig.systems.registry import read_system
 
 CLASSES = "plan.classes=[healthy,crack,pitting,missing_tooth]"
 SPEEDS = "plan.vary={operating.speed_rpm: {distribution: choice, values: [1200, 1800, 2400]}}"
@@ -44,7 +46,9 @@ SETS = {
 
 @functools.cache
 def foretold(name):
-    return predict(read_request([*SETS[name], "executor.n_workers=1"]).config)
+    return predict(
+        InputReader(read_request([*SETS[name], "executor.n_workers=1"]).config)
+    )
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -74,7 +78,7 @@ def test_what_a_grid_holds_is_told():
 def test_every_varied_key_has_a_line_with_its_range():
     words = ["experiment=many_machines", "fault.crack_depth_mm=1"]
     config = read_request(words).config
-    varied = varied_keys(config)
+    varied = varied_keys(InputReader(config))
     assert varied["gear.pinion.n_teeth"] == "18 to 60, whole numbers"
     assert varied["operating.speed_rpm"] == "400 to 3600, logarithmic"
     assert varied["operating.torque_nm"] == (
@@ -88,7 +92,7 @@ def test_every_varied_key_has_a_line_with_its_range():
 
 def test_faults_of_lives_grow():
     config = read_request(["experiment=run_to_failure"]).config
-    varied = varied_keys(config)
+    varied = varied_keys(InputReader(config))
     grown = {name for name, text in varied.items() if text == "grows along each life"}
     assert grown == set(config["classes"])
     assert set(varied) - grown == set(config["plan"]["vary"])
@@ -100,7 +104,7 @@ def test_faults_of_lives_grow():
 def test_a_block_is_as_many_records_as_128_mebibytes_hold(duration, n_records):
     """From 8, one for each lane, to 16; a second of four channels has 1.6 MB."""
     words = [f"operating.duration_s={duration}"]
-    assert block_length(read_request(words).config) == n_records
+    assert block_length(read_system(read_request(words).config)) == n_records
 
 
 def test_records_that_fail_while_they_are_timed_are_told(monkeypatch):
@@ -117,4 +121,4 @@ def test_records_that_fail_while_they_are_timed_are_told(monkeypatch):
         FailedRecordsWarning,
         match="^1 of 2 records made to time the plan failed: it grew$",
     ):
-        predict(config)
+        predict(InputReader(config))

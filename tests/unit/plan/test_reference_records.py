@@ -11,6 +11,7 @@ from gensig.errors import ConfigError
 from gensig.plan.make import make_plan
 from gensig.plan.notes import plan_notes
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
 
 SPEED = "operating.speed_rpm: {distribution: choice, values: [1200, 1800]}"
 TORQUE = "operating.torque_nm: {distribution: uniform, low: 10, high: 40, levels: 3}"
@@ -107,7 +108,9 @@ def test_no_split_has_a_reference_and_all_are_as_without(both):
         assert not references & set(table.record_id.tolist())
         assert split_problems(name, table, plan) == []
     assert why_left_out(plan, config.seed) == why_left_out(plain, config.seed)
-    assert plan_notes(config, plan) == plan_notes(config, plain)
+    assert plan_notes(InputReader(config), plan) == plan_notes(
+        InputReader(config), plain
+    )
 
 
 @pytest.mark.parametrize("name", ["by_unit", "random_window_leaky"])

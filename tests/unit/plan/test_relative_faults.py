@@ -10,7 +10,7 @@ from gensig.errors import ConfigError
 from gensig.geometry.tooth_profile import root_curve_point
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.systems.registry import read_pair
+from gensig.systems.registry import PairParts
 
 PLAN = ("plan.n_records=48", "plan.n_units=4", "plan.classes=[healthy,crack,pitting]")
 
@@ -75,7 +75,7 @@ def test_cracks_of_teeth_that_are_thin_at_the_root_stay_in_the_checked_range():
     config = read_request(
         ["gear.pinion.n_teeth=18", "plan.classes=[crack]", "plan.n_records=96"]
     ).config
-    gear = read_pair(config).pinion
+    gear = PairParts(config).pair.pinion
     chord = 2e3 * root_curve_point(gear, "arc_mid")[1]
     depth = np.asarray(make_plan(config).columns["params/fault.crack_depth_mm"])
     assert 0.75 * chord < depth.max() <= 0.8 * chord < 1.59 * 2.0

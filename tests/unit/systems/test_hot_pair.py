@@ -23,7 +23,7 @@ from gensig.systems.hot_pair import (
     stiffness_variants,
     sweep,
 )
-from gensig.systems.registry import read_duty, read_sliced_pair, read_system
+from gensig.systems.registry import PairParts, read_sliced_pair, read_system
 
 MESH = [
     "system=helical_pair",
@@ -55,7 +55,7 @@ def config_of(*words, heat="chongqing_rated"):
 
 
 def duty_of(*words, **options):
-    return read_duty(config_of(*words, **options))
+    return PairParts(config_of(*words, **options)).duty
 
 
 def variants_of(*words):
@@ -412,10 +412,10 @@ def test_a_plan_varies_heat():
     """Records of one set are cold, warming and hot."""
     config = config_of()
     warm = config.with_values({"heat.running_time_s": 120.0})
-    assert read_duty(warm).heat.running_time == 120.0
+    assert PairParts(warm).duty.heat.running_time == 120.0
     hotter = config.with_values({"heat.oil_temperature_degc": 80.0})
     rise = (
-        hot_state(read_duty(hotter)).pinion.tooth
-        - hot_state(read_duty(config)).pinion.tooth
+        hot_state(PairParts(hotter).duty).pinion.tooth
+        - hot_state(PairParts(config).duty).pinion.tooth
     )
     assert_close(rise, 20.0, 0.05)

@@ -253,7 +253,7 @@ class TestRecords:
     def test_a_record_of_the_realistic_machine(self, realistic, runs):
         short = realistic.with_keys("operating", duration_s=0.1)
         row = next(row for row, _ in runs if row["label_name"] == "missing_tooth")
-        record = simulate_record(short, row)
+        record = simulate_record(InputReader(short), row)
 
         assert record.signals["acceleration"].shape == (3, 5120)
         assert np.isfinite(record.signals["acceleration"]).all()

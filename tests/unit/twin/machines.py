@@ -6,6 +6,7 @@ import numpy as np
 
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_record
 
 RATE = 25600.0
@@ -71,7 +72,7 @@ def measured(*, duration=2.4, seed=5, profile=None, snr=SNR, grade=GRADE, path=T
             "transmissibility": 0.5,
         }
         config = config.with_keys("sensing", path=modal, sensors=["case", "lid"])
-    record = simulate_record(config, make_plan(config).record(0))
+    record = simulate_record(InputReader(config), make_plan(config).record(0))
     assert record.values.get("status") != "failed"
     angle = record.signals["shaft_angle"]
     speed = (angle[-1] - angle[0]) * RATE / (len(angle) - 1) * 60.0 / (2.0 * np.pi)

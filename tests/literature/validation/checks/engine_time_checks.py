@@ -28,7 +28,12 @@ from gensig.driveline.excitation.cycle_statistics import (
     order_amplitudes,
     typical_extremes,
 )
-from gensig.driveline.in_time import TimeResponse, tabulated_meshes, time_response
+from gensig.driveline.in_time import (
+    TimeResponse,
+    read_tooth_law,
+    tabulated_meshes,
+    time_response,
+)
 from gensig.driveline.time_root_stress import root_stress_in_time, typical_largest
 from gensig.options.compose import compose
 from gensig.options.configuration import Configuration
@@ -63,7 +68,7 @@ class TimeCase:
             self.line.engine.reference.speed,
             self.line.engine.reference.torque,
         )
-        own = tabulated_meshes(self.line, self.config, speed, torque)
+        own = tabulated_meshes(self.line, read_tooth_law(self.config), speed, torque)
         return time_response(
             self.line, speed, torque, tabulated=own, nodes=NODES, duration=DURATION
         )

@@ -23,7 +23,7 @@ from gensig.systems.hot_pair import (
     stiffness_variants,
     sweep,
 )
-from gensig.systems.registry import read_duty
+from gensig.systems.registry import PairParts
 from validation.rows import printed_value
 
 HotCheck = Callable[["HotCase", str], float]
@@ -56,7 +56,7 @@ class HotCase:
 @lru_cache(maxsize=64)
 def read_hot_case(overrides: tuple[str, ...]) -> HotCase:
     """Compose the pair of a row."""
-    return HotCase(duty=read_duty(compose("generate", overrides)))
+    return HotCase(duty=PairParts(compose("generate", overrides)).duty)
 
 
 def _mesh(case: HotCase, at: str) -> float:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gensig.options.compose import compose
 from gensig.papers.error_paper import SPEEDS_RPM, run_up_level
 from gensig.systems.helical_pair import HelicalPair
-from gensig.systems.registry import read_helical_pair
+from gensig.systems.registry import read_system
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ class RunUpCase:
 def read_run_up_case(overrides: tuple[str, ...]) -> RunUpCase:
     """Compose the machine of a row."""
     return RunUpCase(
-        system=read_helical_pair(compose("generate", overrides)), overrides=overrides
+        system=read_system(compose("generate", overrides)), overrides=overrides
     )
 
 
