@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gensig.errors import DatasetError
-from gensig.options.configuration import Configuration
 from gensig.terminal.printing import show
+
+if TYPE_CHECKING:
+    from diagnose.training.study_folder import Study
 
 HELP = """\
 Finish a study that was stopped: by Ctrl-C, a kill, a batch system or a power cut.
@@ -41,23 +44,18 @@ def run(arguments: Namespace) -> int:
         complete_study(out)
         show(f"{out} is complete")
         return 0
-    train_one(_configuration(study.configuration(out), out))
+    _refuse_other_keys(study, out)
+    train_one(study.goes_on(out))
     return 0
 
 
-def _configuration(config: Configuration, out: Path) -> Configuration:
-    """A stored configuration, with the keys that this version knows and no others.
-
-    Raises
-    ------
-    DatasetError    with the keys that differ
-    """
+def _refuse_other_keys(study: Study, out: Path) -> None:
+    """Raise DatasetError for a study with other keys than those that this version knows."""
     from gensig.options.compose import compose
 
     known = compose("train", ["data=.", "out=."])
-    if keys := sorted(set(config) ^ set(known)):
+    if keys := sorted(set(study.config) ^ set(known)):
         raise DatasetError(
             f"{out} was begun by another version of gensig, with other keys "
             f"({', '.join(keys[:3])}); remove it and train again"
         )
-    return config

@@ -18,6 +18,7 @@ from gensig.terminal.warning_lines import one_line_warnings
 if TYPE_CHECKING:
     from diagnose.data.windows import Task
     from diagnose.settings import TrainSettings
+    from diagnose.training.study_folder import Study
 
 HELP = """\
 Train a network and its baselines on splits of a data set and write a report. Default protocols:
@@ -62,23 +63,23 @@ def run(arguments: Namespace) -> int:
     overrides, config_dir = arguments.overrides, arguments.config_dir
     if not arguments.multirun:
         override_keys(overrides)
-        config = _composed(overrides, config_dir)
-        refuse_used(Path(config["out"]), config)
-        train_one(config)
+        study = _study(overrides, config_dir)
+        refuse_used(study)
+        train_one(study)
         return 0
     jobs = _expand(overrides, config_dir)
-    for number, config in enumerate(jobs, start=1):
-        out, which = Path(config["out"]), f"run {number} of {len(jobs)}"
+    for number, study in enumerate(jobs, start=1):
+        out, which = study.out, f"run {number} of {len(jobs)}"
         if _is_complete(out):
             tell(f"{which}: {out} is complete")
             continue
         tell(f"{which}: {out}")
-        train_one(config)
+        train_one(study)
     return 0
 
 
-def refuse_used(out: Path, config: Configuration) -> None:
-    """Refuse a folder that holds anything but the same study, which was stopped.
+def refuse_used(study: Study) -> None:
+    """Refuse a study's folder that holds anything but the same study, which was stopped.
 
     Raises
     ------
@@ -91,8 +92,9 @@ def refuse_used(out: Path, config: Configuration) -> None:
         require_same,
     )
 
+    out = study.out
     refuse_in_work(out)
-    if holds_study(out) and not require_same(out, config).is_complete:
+    if holds_study(out) and not require_same(out, study).is_complete:
         return
     if not is_blank(out):
         refuse_existing(out)
@@ -104,23 +106,23 @@ def _is_complete(out: Path) -> bool:
     return holds_study(out) and read_study(out).is_complete
 
 
-def _composed(overrides: Sequence[str], config_dir: str | None) -> Configuration:
-    """Configuration of one training; options of one's own may be in ./configs."""
+def _study(overrides: Sequence[str], config_dir: str | None) -> Study:
+    """The study that overrides ask for; options of one's own may be in ./configs."""
+    from diagnose.training.study_folder import Study
     from gensig.options.compose import compose
     from gensig.options.own_options import with_own_options
     from gensig.options.typed_only import refuse_untyped
 
-    def read(folder: str | Path | None) -> Configuration:
-        return compose("train", overrides, config_dir=folder)
-
     with one_line_warnings("diagnose"):
-        config = with_own_options(read, config_dir)
+        config = with_own_options(
+            lambda folder: compose("train", overrides, config_dir=folder), config_dir
+        )
     refuse_untyped(config, overrides)
-    return config
+    return Study.of(config)
 
 
-def _expand(overrides: Sequence[str], config_dir: str | None) -> list[Configuration]:
-    """Configurations of a multirun, each with its own ``out``.
+def _expand(overrides: Sequence[str], config_dir: str | None) -> list[Study]:
+    """Studies of a multirun, each with its own ``out``.
 
     All composed before the first one runs. The folders may be there where the same runs were
     stopped.
@@ -129,41 +131,40 @@ def _expand(overrides: Sequence[str], config_dir: str | None) -> list[Configurat
     from gensig.options.compose import job_folders, sweep
 
     jobs = sweep(overrides, config_dir=config_dir)
-    configs = [_composed(job, config_dir) for job in jobs]
-    parents = {str(config["out"]) for config in configs}
+    studies = [_study(job, config_dir) for job in jobs]
+    parents = {str(study.config["out"]) for study in studies}
     if len(parents) > 1:
         raise ConfigError(
             "out must be one folder; with -m each run gets a folder below it"
         )
     parent = Path(parents.pop())
-    folders = [str(parent / name) for name in job_folders(jobs)]
-    configs = [
-        config.with_entries(out=out)
-        for config, out in zip(configs, folders, strict=True)
+    studies = [
+        study.goes_on(parent / name)
+        for study, name in zip(studies, job_folders(jobs), strict=True)
     ]
     done = [
-        require_same(Path(out), config).is_complete
-        for out, config in zip(folders, configs, strict=True)
-        if holds_study(Path(out))
+        require_same(study.out, study).is_complete
+        for study in studies
+        if holds_study(study.out)
     ]
     is_left = parent.is_dir() and all(map(is_blank, parent.iterdir()))
-    if done.count(True) == len(configs) or not (done or is_left):
+    if done.count(True) == len(studies) or not (done or is_left):
         refuse_existing(parent)
-    for out, config in zip(folders, configs, strict=True):
-        if not _is_complete(Path(out)):
-            refuse_used(Path(out), config)
-    return configs
+    for study in studies:
+        if not _is_complete(study.out):
+            refuse_used(study)
+    return studies
 
 
-def train_one(config: Configuration) -> None:
-    """Run the study of one configuration, or go on with it in a folder that was begun."""
+def train_one(study: Study) -> None:
+    """Run a study, or go on with it in a folder that was begun."""
     from diagnose.settings import settings_from
     from diagnose.training.study_folder import holds_study, quoted
 
-    settings = settings_from(config)
+    settings = settings_from(Configuration(study.config))
     out = Path(settings.out)
     try:
-        page, lines = STUDIES[settings.task](settings, config)
+        page, lines = STUDIES[settings.task](settings, study)
     except KeyboardInterrupt:
         if not holds_study(out):
             raise Interrupted("run the same command again") from None
@@ -174,9 +175,7 @@ def train_one(config: Configuration) -> None:
     show(f"report: {page}")
 
 
-def _study_classes(
-    settings: TrainSettings, config: Configuration
-) -> tuple[Path, list[str]]:
+def _study_classes(settings: TrainSettings, study: Study) -> tuple[Path, list[str]]:
     """Page and tables of a study that tells classes apart."""
     from diagnose.data.protocols import choose_protocols
     from diagnose.recordings.found_faults import found_fault_pictures
@@ -192,7 +191,7 @@ def _study_classes(
     left_out = choose_protocols(task, settings.protocols)[1]
     for name, reason in baselines_left_out(task, settings, protocols).items():
         tell(f"baseline {name} is left out of {reason}")
-    with study_at_work(out, config) as kept_in:
+    with study_at_work(out, study) as kept_in:
         with _progress(len(jobs), left_out) as on_done:
             metrics = run_study(
                 task,
@@ -216,9 +215,7 @@ def _study_classes(
     return page, tables + without_interval(metrics)
 
 
-def _study_lives(
-    settings: TrainSettings, config: Configuration
-) -> tuple[Path, list[str]]:
+def _study_lives(settings: TrainSettings, study: Study) -> tuple[Path, list[str]]:
     """Page and tables of a study of remaining lives."""
     from diagnose.data.lives import lives_of
     from diagnose.report.life_report import life_tables, write_life_report
@@ -233,7 +230,7 @@ def _study_lives(
     task, settings = _opened(settings)
     out = Path(settings.out)
     plan = plan_life_study(task, settings)
-    with study_at_work(out, config) as kept_in:
+    with study_at_work(out, study) as kept_in:
         with _progress(len(plan.jobs), plan.left_out) as on_done:
             metrics, predictions = run_life_study(
                 task, settings, out, plan, kept_in=kept_in, on_done=on_done

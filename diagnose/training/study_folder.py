@@ -12,7 +12,7 @@ import shlex
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -53,14 +53,28 @@ class Study:
     config: dict[str, Any]
     is_complete: bool = False
 
-    def configuration(self, out: Path) -> Configuration:
-        """Configuration of a run that goes on, from a folder which may have been moved."""
-        config = Configuration(self.config)
+    @classmethod
+    def of(cls, config: Configuration) -> Study:
+        """The study that a composed configuration begins."""
+        return cls(
+            gensig=__version__,
+            data_folder=_absolute(config["data"]),
+            config=config.plain(),
+        )
+
+    @property
+    def out(self) -> Path:
+        """Its folder, as configured."""
+        return Path(self.config["out"])
+
+    def goes_on(self, out: Path) -> Study:
+        """The same study in a folder that may have been moved."""
+        config = dict(self.config)
         if _absolute(config["out"]) != _absolute(out):
-            config = config.with_entries(out=str(out))
+            config["out"] = str(out)
         if _absolute(config["data"]) != self.data_folder:
-            config = config.with_entries(data=self.data_folder)
-        return config
+            config["data"] = self.data_folder
+        return replace(self, config=config)
 
 
 def holds_study(out: Path) -> bool:
@@ -131,18 +145,17 @@ def _altered(path: Path) -> DatasetError:
     )
 
 
-def require_same(out: Path, config: Configuration) -> Study:
-    """The study of a folder, which was begun with this configuration.
+def require_same(out: Path, asked: Study) -> Study:
+    """The study of a folder, which was begun with the configuration that is asked for.
 
     Raises
     ------
     DatasetError    as `read_study`, and for another configuration, with the keys that differ
     """
     study = read_study(out)
-    asked = config.plain()
-    names = sorted({*asked, *study.config} - {*FREE_KEYS, "data"})
-    keys = [name for name in names if asked.get(name) != study.config.get(name)]
-    if _absolute(config["data"]) != study.data_folder:
+    names = sorted({*asked.config, *study.config} - {*FREE_KEYS, "data"})
+    keys = [name for name in names if asked.config.get(name) != study.config.get(name)]
+    if asked.data_folder != study.data_folder:
         keys.insert(0, "data")
     if keys:
         listed = ", ".join(keys[:MOST_NAMED])
@@ -154,7 +167,7 @@ def require_same(out: Path, config: Configuration) -> Study:
 
 
 @contextmanager
-def study_at_work(out: Path, config: Configuration) -> Iterator[Path]:
+def study_at_work(out: Path, asked: Study) -> Iterator[Path]:
     """Folder for results of finished jobs, below that of a study which is made in this block.
 
     The study is begun where ``out`` holds none. Where it is ended by an error before any job is
@@ -172,9 +185,9 @@ def study_at_work(out: Path, config: Configuration) -> Iterator[Path]:
         raise cannot_write(out, error) from error
     with at_work(jobs, others=False):
         if holds_study(out):
-            require_same(out, config)
+            require_same(out, asked)
         else:
-            _write(out, _begun(config))
+            _write(out, asked)
         try:
             yield jobs
         except Exception:
@@ -188,29 +201,13 @@ def complete_study(out: Path) -> None:
     """Say that a study is complete, and remove the results of its jobs."""
     study = read_study(out)
     if not study.is_complete:
-        _write(
-            out,
-            Study(
-                gensig=study.gensig,
-                data_folder=study.data_folder,
-                config=study.config,
-                is_complete=True,
-            ),
-        )
+        _write(out, replace(study, is_complete=True))
     shutil.rmtree(out / FINISHED_JOBS, ignore_errors=True)
 
 
 def quoted(out: Path) -> str:
     """A folder as it is typed."""
     return shlex.quote(str(out))
-
-
-def _begun(config: Configuration) -> Study:
-    return Study(
-        gensig=__version__,
-        data_folder=_absolute(config["data"]),
-        config=config.plain(),
-    )
 
 
 def _write(out: Path, study: Study) -> None:

@@ -74,8 +74,8 @@ def test_every_run_of_a_sweep_takes_options_of_one_s_own(tmp_path):
     (folder / "small.yaml").write_text("name: cnn\nkind: small_cnn\nwidths: [4, 4]\n")
     words = ["data=a", f"out={tmp_path / 'out'}", "model=glob([cnn,small])"]
     shipped, small = _expand(words, str(tmp_path / "mine"))
-    assert list(small["model"]["widths"]) == [4, 4]
-    assert list(shipped["model"]["widths"]) != [4, 4]
+    assert list(small.config["model"]["widths"]) == [4, 4]
+    assert list(shipped.config["model"]["widths"]) != [4, 4]
 
 
 @pytest.mark.parametrize(

@@ -90,9 +90,9 @@ class Brief:
     def __init__(self):
         self.left, self.made = 99, []
 
-    def __call__(self, settings, config):
+    def __call__(self, settings, asked):
         out = Path(settings.out)
-        with study_at_work(out, config) as kept:
+        with study_at_work(out, asked) as kept:
             if self.error is not None:
                 raise self.error
             (kept / "a.json").touch()
@@ -177,7 +177,7 @@ def test_a_study_that_was_moved_goes_on(brief, stopped, tmp_path, monkeypatch, c
     monkeypatch.chdir(moved.parent)
     assert main(["resume", "mine"]) == 0
     assert brief.made == ["mine"]
-    config = read_study(moved).configuration(Path("mine"))
+    config = read_study(moved).goes_on(Path("mine")).config
     assert (config["out"], config["data"]) == ("mine", str(tmp_path / "good"))
 
 
