@@ -76,8 +76,8 @@ def compose(
     """
     words = in_digits(overrides)
     if config_dir is None:
-        return _packaged(config_name, words)
-    return _composed(config_name, words, config_dir)
+        return Configuration(_packaged(config_name, words))
+    return Configuration(_composed(config_name, words, config_dir))
 
 
 def in_digits(overrides: Sequence[str]) -> tuple[str, ...]:
@@ -86,14 +86,15 @@ def in_digits(overrides: Sequence[str]) -> tuple[str, ...]:
 
 
 @functools.lru_cache(maxsize=256)
-def _packaged(config_name: str, words: tuple[str, ...]) -> Configuration:
+def _packaged(config_name: str, words: tuple[str, ...]) -> dict[str, Any]:
+    """Composition of the package's files; not to be changed."""
     try:
         return _set_in_options(config_name, words)
     except (ConfigError, HydraException, OmegaConfBaseException, ValueError):
         return _composed(config_name, words, None)
 
 
-def _set_in_options(config_name: str, words: tuple[str, ...]) -> Configuration:
+def _set_in_options(config_name: str, words: tuple[str, ...]) -> dict[str, Any]:
     """Values set in a copy of the chosen options, as Hydra sets them.
 
     Reading the options takes a hundred times longer.
@@ -128,7 +129,7 @@ def _chosen_options(config_name: str, words: tuple[str, ...]) -> DictConfig:
         return hydra_compose(config_name=config_name, overrides=list(words))
 
 
-def _resolved(config: DictConfig) -> Configuration:
+def _resolved(config: DictConfig) -> dict[str, Any]:
     """A composition with its references resolved, which may be those to keys alone."""
     check_references(config)
     values = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
@@ -136,7 +137,7 @@ def _resolved(config: DictConfig) -> Configuration:
     refuse_references(values, "a composed configuration")
     plain = {str(key): value for key, value in values.items()}
     check_values(plain)
-    return Configuration(plain)
+    return plain
 
 
 def check_references(config: DictConfig) -> None:
@@ -169,7 +170,7 @@ def composed_groups(
 
 def _composed(
     config_name: str, words: tuple[str, ...], config_dir: str | Path | None
-) -> Configuration:
+) -> dict[str, Any]:
     config = _hydra_composed(config_name, words, config_dir)
     try:
         return _resolved(config)

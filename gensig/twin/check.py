@@ -5,6 +5,7 @@ It compares levels by band and indicators, by sensor.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +26,25 @@ from gensig.twin.grade import median_of_finite, sideband_ratios
 
 Array = NDArray[np.float64]
 
-N_RECORDS = 12
+N_RECORDS = 12  # healthy, each of a different set of gears
+PLAN: Mapping[str, Any] = {
+    "n_records": N_RECORDS,
+    "n_units": N_RECORDS,
+    "n_gearboxes": 1,
+    "conditions_per_unit": None,
+    "n_repeats": 1,
+    "classes": ["healthy"],
+    "design": "latin_hypercube",
+    "vary": {},
+    "sham": False,
+}
+CLASSES = {"healthy": {"kind": "healthy", "vary": {}}}
+STORED = {
+    "store_mesh_state": False,
+    "store_detectability": False,
+    "store_healthy_twin": False,
+    "store_shaft_angle": True,
+}
 # share of equals that lies between the least and the greatest of them
 EXPECTED = (N_RECORDS - 1) / (N_RECORDS + 1)
 LONGEST = 2.0  # s of the held-out recording that are compared
@@ -104,7 +123,8 @@ def check(
     measured, before = (
         recording.acceleration[:, :n_samples] for recording in (held_out, fitted)
     )
-    records = _healthy_records(config)
+    healthy = config.with_entries(plan=PLAN, classes=CLASSES)
+    records = _recorded(InputReader(healthy.with_keys("dataset", **STORED)))
     lower, upper = third_octave_bands(n_samples, rate)
     n_driving = teeth.driving
     return Check(
@@ -124,34 +144,12 @@ def check(
     )
 
 
-def _healthy_records(config: Configuration) -> list[tuple[Array, Array]]:
-    """Accelerations (sensor, sample) and shaft angles (sample,) of healthy records.
-
-    Each has a different set of gears.
-    """
-    plan: dict[str, Any] = {
-        "n_records": N_RECORDS,
-        "n_units": N_RECORDS,
-        "n_gearboxes": 1,
-        "conditions_per_unit": None,
-        "n_repeats": 1,
-        "classes": ["healthy"],
-        "design": "latin_hypercube",
-        "vary": {},
-        "sham": False,
-    }
-    classes = {"healthy": {"kind": "healthy", "vary": {}}}
-    whole = config.with_entries(plan=plan, classes=classes).with_keys(
-        "dataset",
-        store_mesh_state=False,
-        store_detectability=False,
-        store_healthy_twin=False,
-        store_shaft_angle=True,
-    )
-    drawn = make_plan(whole)
-    rows = [drawn.record(index) for index in range(N_RECORDS)]
+def _recorded(reader: InputReader) -> list[tuple[Array, Array]]:
+    """Accelerations (sensor, sample) and shaft angles (sample,) of all records of a plan."""
+    drawn = make_plan(reader.config)
+    rows = [drawn.record(index) for index in range(drawn.n_records)]
     records = []
-    for record in simulate_records(InputReader(whole), rows):
+    for record in simulate_records(reader, rows):
         if record.values.get("status") == "failed":
             reason = record.values["status_reason"]
             raise SimulationError(f"a healthy record of the twin failed: {reason}")

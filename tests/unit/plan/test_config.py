@@ -11,6 +11,7 @@ from gensig.errors import ConfigError, GensigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import read_faults
 from gensig.options.compose import _composed, compose, override_keys, sweep
+from gensig.options.configuration import Configuration
 from gensig.options.groups import options
 from gensig.plan.request import DerivedValueWarning, read_request
 from gensig.systems.pair_machine import severity
@@ -85,9 +86,10 @@ def test_overrides_are_kept_as_typed():
 def test_values_set_in_kept_options_are_those_of_a_whole_composition(words):
     def content(compose):
         try:
-            return compose("generate", tuple(re.split(r" (?=\S+=|~)", words))).plain()
+            composed = compose("generate", tuple(re.split(r" (?=\S+=|~)", words)))
         except ConfigError as error:
             return str(error)
+        return Configuration(composed).plain()
 
     whole = functools.partial(_composed, config_dir=None)
     assert repr(content(compose)) == repr(content(whole))
