@@ -199,3 +199,18 @@ def test_the_architecture_page_links_every_example() -> None:
         if path.is_file() and not path.name.startswith("test_")
     }
     assert files <= linked
+
+
+@pytest.mark.parametrize("package", ["gensig", "diagnose"])
+def test_the_architecture_page_shows_every_folder_and_module(package: str) -> None:
+    """Of the top level; `moved` holds the paths of earlier versions alone."""
+    page = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    picture = (
+        page.partition(f"\n{package}/\n")[2].partition("\n\n")[0].partition("\n```")[0]
+    )
+    first = re.findall(r"^  (\w\S*(?: \w\S*)*)", picture, re.MULTILINE)
+    files = {path.stem for path in (ROOT / package).glob("[!_]*.py")} - {"moved"}
+    folders = {
+        f"{path.parent.name}/" for path in (ROOT / package).glob("*/__init__.py")
+    }
+    assert set(" ".join(first).split()) == files | folders
