@@ -27,6 +27,7 @@ HELPERS = (ORDER, "_stale_cache")  # modules that tests in a copy can import
 # Tests of the tree, of the pages and of the campaigns themselves.
 LEFT_OUT = (
     "tests/test_architecture.py",
+    "tests/unit/options/test_configuration_readers.py",
     "tests/unit/docs/",
     "tests/unit/test_benchmark_stages.py",
     "tests/unit/test_mutants.py",

@@ -55,6 +55,7 @@ from gensig.version import __version__
 Array = NDArray[np.float64]
 Row = Mapping[str, Any]  # one row of a plan, by column
 MISSING = float("nan")
+MOST_MACHINES = 256  # that a reader keeps
 AS_CONFIGURED: Mapping[str, float] = MappingProxyType({})  # no value is drawn
 NUMBER = re.compile(r"[0-9]{1,18}")  # at the end of an id
 
@@ -377,6 +378,8 @@ class InputReader:
         """The machine of the configuration with drawn values put in."""
         drawn = tuple(values.items())
         if drawn not in self._machines:
+            if len(self._machines) == MOST_MACHINES:
+                del self._machines[next(iter(self._machines))]
             self._machines[drawn] = read_machine(self.config.with_values(values))
         return self._machines[drawn]
 
