@@ -41,7 +41,10 @@ def equal_classes(reader: InputReader, plan: Plan) -> list[str]:
     for name, option in reader.classes.items():
         if not fault_parts(option):
             continue
-        largest, *others = _extreme_faults(plan, name)
+        of_records = _extreme_faults(plan, name)
+        if not of_records:
+            continue
+        largest, *others = of_records
         try:
             own = passage_approach(machine, largest)
             free = _stands_free(machine, [largest, *others])
@@ -64,6 +67,7 @@ def equal_classes(reader: InputReader, plan: Plan) -> list[str]:
 def _extreme_faults(plan: Plan, name: str) -> list[list[Fault]]:
     """Faults of the class's records with the largest severity and the largest deviations.
 
+    None for a class without records, as where a plan has fewer lives than classes.
     The severity tells nothing of the sign of a deviation: a tooth in front always touches.
     """
     columns = plan.columns

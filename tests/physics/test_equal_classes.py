@@ -144,3 +144,11 @@ def test_a_limit_needs_a_highest_value():
     config = read_request([*SMALL, "fault=pitch_error", vary]).config
     with pytest.raises(ConfigError, match="at_most_of_reach must be numbers"):
         make_plan(config)
+
+
+def test_a_class_that_no_life_has_is_passed_over():
+    """Two lives, of fewer classes than the plan has."""
+    config = read_request(["experiment=run_to_failure", "plan.n_units=2"]).config
+    plan = make_plan(config)
+    assert len(set(plan.columns["label_name"])) < len(config["plan"]["classes"])
+    assert equal_classes(InputReader(config), plan) == []
