@@ -200,7 +200,8 @@ def test_a_mesh_without_tabulated_teeth_has_its_force_alone():
     words = ("system.helical_meshes=constant", "dataset.store_mesh_state=true")
     few = ("operating.duration_s=0.02", "plan.n_records=1", "plan.classes=[healthy]")
     config = read_request([*ENGINE, *words, *few]).config
-    signals = simulate_record(config, make_plan(config).record(0)).signals
+    record = simulate_record(InputReader(config), make_plan(config).record(0))
+    signals = record.signals
     spur, helical = "", "crankshaft_gear_large_idler_gear_"
     assert (signals[f"{spur}mesh_pinion_tooth"] >= 0).any()
     assert (signals[f"{helical}mesh_pinion_tooth"] == -1).all()
