@@ -217,8 +217,8 @@ def nearest_tests(root: Path, name: str, function: str = "") -> list[str]:
 
     A file ranks by the imports between it and the module, by their names and folders, by its
     mention of the function or its class, and higher among the tests of the module's package.
-    Tests of whole commands come last, unless they import the module themselves. Where no test is
-    near, the nearest of the far ones count.
+    Tests of whole commands come last, unless they import the module themselves or have its name.
+    Where no test is near, the nearest of the far ones count.
     """
     module, folder = _dotted(name), _folder_of_tests(name)
     package = "/".join(folder.split("/")[:3])  # such as tests/unit/dataset
@@ -240,7 +240,7 @@ def nearest_tests(root: Path, name: str, function: str = "") -> list[str]:
         if is_far and not (step and test.startswith(folder)):
             continue
         is_late = test.startswith(COMMANDS) and distance > 1
-        is_late = is_late and not folder.startswith(COMMANDS)
+        is_late = is_late and not folder.startswith(COMMANDS) and likeness < ALIKE
         nearness = likeness + 1.0 / distance
         nearness += 1.0 * _mentions(root / test, function)
         nearness += 0.5 * Path(test).is_relative_to(package)

@@ -19,7 +19,10 @@ from gensig.driveline.reading import read_line_machine
 from gensig.dynamics.decimation import in_band_error
 from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
+from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
+from gensig.record.simulate import simulate_record
 from gensig.systems.base import simulate_together
 from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.run import Start
@@ -249,3 +252,24 @@ def test_what_the_core_does_not_cover_is_refused():
     assert isinstance(error, SimulationError)
     assert "torques that do not follow an angle" in str(error)
     assert "solver.backend=newmark" in str(error)
+
+
+def test_a_mesh_without_tabulated_teeth_has_its_force_alone():
+    words = ("system.helical_meshes=constant", "dataset.store_mesh_state=true")
+    few = (
+        "operating.duration_s=0.02",
+        "plan.n_records=1",
+        "plan.n_units=1",
+        "plan.classes=[healthy]",
+    )
+    engine = "experiment=engine_broken_tooth"
+    config = read_request([engine, *words, *few]).config
+    record = simulate_record(InputReader(config), make_plan(config).record(0))
+    signals = record.signals
+    spur, helical = "", "crankshaft_gear_large_idler_gear_"
+    assert (signals[f"{spur}mesh_pinion_tooth"] >= 0).any()
+    assert (signals[f"{helical}mesh_pinion_tooth"] == -1).all()
+    for mesh in (spur, helical):
+        force = signals[f"{mesh}mesh_force"]
+        assert force.std() > 100.0
+        assert ((force == 0.0) == signals[f"{mesh}contact_lost"]).all()

@@ -91,8 +91,6 @@ def test_the_command_writes_table_and_figure(tmp_path, capsys):
     [
         ("fault=missing_tooth --snrs 10", "fault=missing_tooth has no single size"),
         ("fault=crack --sizes 1 1", "--sizes: 1, 1; give numbers, each once"),
-        ("fault=crack --speeds 900 900", "speeds in r/min: 900, 900; give positive"),
-        ("fault=crack --torques 20 20", "torques in N m: 20, 20; give positive"),
         ("fault=crack --sizes 0 1", "crack_depth_mm = 0"),
         ("fault=crack --snrs 10 --speeds 900", "give operating.speed_rpm=RPM"),
         ("fault=crack --sizes 1 fault.crack_depth_mm=2", "given twice"),

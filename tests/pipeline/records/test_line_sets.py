@@ -12,7 +12,6 @@ from gensig.dataset.folder.layout import PLAN
 from gensig.dataset.plan import PlanRows
 from gensig.dataset.reader import open_dataset
 from gensig.errors import DatasetError
-from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_record
@@ -194,18 +193,3 @@ def test_readers_know_all_gears_of_a_line(made):
         assert rotation.of(index)[gear] > 0.0
         with pytest.raises(DatasetError, match="n_teeth_sun"):
             data.n_teeth("sun")
-
-
-def test_a_mesh_without_tabulated_teeth_has_its_force_alone():
-    words = ("system.helical_meshes=constant", "dataset.store_mesh_state=true")
-    few = ("operating.duration_s=0.02", "plan.n_records=1", "plan.classes=[healthy]")
-    config = read_request([*ENGINE, *words, *few]).config
-    record = simulate_record(InputReader(config), make_plan(config).record(0))
-    signals = record.signals
-    spur, helical = "", "crankshaft_gear_large_idler_gear_"
-    assert (signals[f"{spur}mesh_pinion_tooth"] >= 0).any()
-    assert (signals[f"{helical}mesh_pinion_tooth"] == -1).all()
-    for mesh in (spur, helical):
-        force = signals[f"{mesh}mesh_force"]
-        assert force.std() > 100.0
-        assert_array_equal(signals[f"{mesh}contact_lost"], force == 0.0)
