@@ -28,7 +28,6 @@ COUNTED = (tokenize.NAME, tokenize.NUMBER, tokenize.OP, tokenize.STRING)
 # Private modules that modules of other folders know: most of them pack drive lines for their core.
 # No other may be added.
 BORROWED = {
-    "gensig.driveline.machine": {"gensig.dynamics._layout"},
     "gensig.driveline.side_by_side.line_integration": {
         "gensig.dynamics.backends.nystroem._line_chord_meshes",
         "gensig.dynamics.backends.nystroem._line_layout",
@@ -39,16 +38,10 @@ BORROWED = {
         "gensig.dynamics._vector",
         "gensig.dynamics.backends.nystroem._line_layout",
     },
-    "gensig.driveline.side_by_side.line_pairs": {"gensig.dynamics._layout"},
     "gensig.driveline.side_by_side.line_records": {
-        "gensig.dynamics._layout",
         "gensig.dynamics.backends.nystroem._line_layout",
     },
-    "gensig.driveline.time.newmark": {
-        "gensig.dynamics._layout",
-        "gensig.dynamics._tableau",
-    },
-    "gensig.systems.helical_pair": {"gensig.dynamics._layout"},
+    "gensig.driveline.time.newmark": {"gensig.dynamics._tableau"},
 }
 
 

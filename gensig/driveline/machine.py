@@ -62,7 +62,7 @@ from gensig.driveline.teeth import (
     tooth_table,
 )
 from gensig.driveline.time.newmark import LineMotion, LineSolver
-from gensig.dynamics._layout import MOST_PAIRS
+from gensig.dynamics.backends.base import MOST_PAIRS
 from gensig.dynamics.backends.registry import EXPLICIT_BACKEND
 from gensig.dynamics.integrator import check_memory
 from gensig.dynamics.mesh_state import MeshState

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import final
 
-from gensig.dynamics._layout import MOST_PAIRS
+from gensig.dynamics.backends.base import MOST_PAIRS
 from gensig.dynamics.helical import AXIAL_DOFS
 from gensig.dynamics.pair import PAIR_DOFS
 from gensig.errors import ConfigError, GeometryError

@@ -12,7 +12,7 @@ from gensig.driveline.line_gears import STILL
 from gensig.driveline.running import RunningLine, reference_force
 from gensig.driveline.teeth import felt_there
 from gensig.driveline.time.newmark import LineMotion
-from gensig.dynamics._layout import SEEN_FORCE
+from gensig.dynamics.backends.base import SEEN_FORCE
 from gensig.dynamics.mesh_state import MeshState, mesh_state
 from gensig.dynamics.pair import Body, PairDynamics
 from gensig.faults.base import faulty_teeth

@@ -16,8 +16,7 @@ from gensig.driveline.side_by_side.line_dynamics import (
 )
 from gensig.driveline.side_by_side.line_integration import integrate_lines
 from gensig.driveline.side_by_side.line_pairs import line_mesh_state
-from gensig.dynamics._layout import N_SEEN
-from gensig.dynamics.backends.base import Integration, Motions
+from gensig.dynamics.backends.base import N_SEEN, Integration, Motions
 from gensig.dynamics.backends.nystroem._line_layout import A_TURN
 from gensig.dynamics.mesh_state import MeshState
 from gensig.errors import SimulationError

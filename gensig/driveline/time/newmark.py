@@ -24,8 +24,8 @@ from gensig.driveline.time.geared_line import (
     pack_meshes,
     pack_torques,
 )
-from gensig.dynamics._layout import N_SEEN
 from gensig.dynamics._tableau import NEWMARK
+from gensig.dynamics.backends.base import N_SEEN
 from gensig.dynamics.decimation import decimator
 from gensig.errors import ConfigError, SimulationError, StepError
 
@@ -84,8 +84,8 @@ class LineMotion:
         flanks
     largest_force, least_force : (mesh,) N  at the internal rate
     newton_rounds : mean of a step
-    seen : (mesh, row, sample)    state of the pairs, rows of ``gensig.dynamics._layout``; no sample
-        where none was asked for
+    seen : (mesh, row, sample)    state of the pairs, as in ``Motions``; no sample where none was
+        asked for
     end : (2, dof)    deviations and their rates where the integration ended
     """
 

@@ -9,6 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.dynamics._layout import MOST_PAIRS as MOST_PAIRS
+from gensig.dynamics._layout import N_SEEN as N_SEEN
+from gensig.dynamics._layout import SEEN_FORCE as SEEN_FORCE
 from gensig.dynamics.pair import PairDynamics
 from gensig.errors import ConfigError
 
@@ -63,7 +66,7 @@ class Motions:
     check : (machine, channel, sample)    the beginning of the same at half the step; no sample
         without ``max_error``
     angle : (angle, sample) rad of each   since time 0, of the pinion or of what a line names
-    seen : (row, sample) of each          the meshes, ``N_SEEN`` rows of ``_layout`` each; none
+    seen : (row, sample) of each          the meshes, ``N_SEEN`` rows each; none
         without ``with_mesh_state``
     mean_speed : (machine,) rad/s         of the first angle
     contact_loss : (machine, mesh)        share of the time without contact
