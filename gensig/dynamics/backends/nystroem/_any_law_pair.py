@@ -106,19 +106,8 @@ def law_at_start(
         set_row(work, rows.ANY_SHORT + k, get_row(work, layout.PAIR_FORCE + k))
         set_row(work, layout.PAIR_FORCE + k, zero)
     first, last = near_pairs(slot, n, near)
-    law = mesh_law(
-        group,
-        first,
-        last,
-        slot,
-        layout.MARGIN,
-        zero,
-        approach,
-        rate,
-        roll_rate,
-        work,
-        wide,
-    )
+    keep_near(first, last, n, near)
+    law = law_in(group, slot, zero, approach, rate, roll_rate, work, wide, near)
     keep_margins(group, END_AT, first, last, slot, work)
     count_anew(group, work, near)
     flags = get_row(work, rows.FRESH)
@@ -197,20 +186,8 @@ def read_slots(group, slot, next_slot, approach, work, wide, near):
 @inlined
 def law_in_middle(group, turned, approach, rate, roll_rate, ahead, work, wide, near):
     """Law in the middle of the step."""
+    law = law_in(group, MIDDLE, turned, approach, rate, roll_rate, work, wide, near)
     first, last = near_pairs(PART, width(work), near)
-    law = mesh_law(
-        group,
-        first,
-        last,
-        MIDDLE,
-        layout.MARGIN,
-        turned,
-        approach,
-        rate,
-        roll_rate,
-        work,
-        wide,
-    )
     keep_margins(group, MIDDLE_AT, first, last, MIDDLE, work)
     return law
 
@@ -218,10 +195,19 @@ def law_in_middle(group, turned, approach, rate, roll_rate, ahead, work, wide, n
 @inlined
 def law_at_end(group, slot, turned, approach, rate, roll_rate, ahead, work, wide, near):
     """Law at the end of the step."""
-    first, last = near_pairs(PART, width(work), near)
     for k in range(layout.MOST_PAIRS):
         set_row(work, layout.PAIR_FORCE + k, spread(work, 0.0))
-    law = mesh_law(
+    law = law_in(group, slot, turned, approach, rate, roll_rate, work, wide, near)
+    first, last = near_pairs(PART, width(work), near)
+    keep_margins(group, END_AT, first, last, slot, work)
+    return law
+
+
+@compiled
+def law_in(group, slot, turned, approach, rate, roll_rate, work, wide, near):
+    """Law by the tables of a slot, of the pairs that come near in the step."""
+    first, last = near_pairs(PART, width(work), near)
+    return mesh_law(
         group,
         first,
         last,
@@ -234,8 +220,6 @@ def law_at_end(group, slot, turned, approach, rate, roll_rate, ahead, work, wide
         work,
         wide,
     )
-    keep_margins(group, END_AT, first, last, slot, work)
-    return law
 
 
 @inlined
