@@ -47,6 +47,7 @@ ROUNDS = 20  # in which chords and the deflection they share converge
 NODES = 0.0, 0.5, 0.5, 1.0
 WEIGHTS = 1.0, 2.0, 2.0, 1.0
 N_STAGES = 4
+SETTLING = 16  # steps a sample of the settling
 
 # rows behind those of the mesh: the law at a stage, the drive, and a row a degree of freedom each:
 # state at the begin of the step and at a stage, q and then v, accelerations, sums, other forces
@@ -232,7 +233,9 @@ CORE = Core(
     pack=pack,
     scratch=scratch,
     integrate=integrate,
-    coarsest_oversampling=lambda machine, oversampling, rate: 1,
+    coarsest_oversampling=lambda machine, oversampling, rate: min(
+        oversampling, SETTLING
+    ),
     settling_time=settling_time,
 )
 
