@@ -42,6 +42,7 @@ from gensig.dynamics.backends.step_limits import settling_time
 from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import PairDynamics
 
+UNLIMITED = 1e30  # N s/m: no damper of a pair is limited
 ROUNDS = 20  # in which chords and the deflection they share converge
 # Kutta (1901): node of every stage, and six times its weight
 NODES = 0.0, 0.5, 0.5, 1.0
@@ -69,7 +70,7 @@ def evaluate(group, approach, rate, roll_rate, rows, work, wide, near):
     set_row(work, layout.WITHIN, approach if group.one_sided else far)
     set_row(work, AHEAD + EVEN, zero)
     set_row(work, layout.TOTAL, zero)
-    set_row(work, layout.MOST_DAMPER, spread(work, layout.UNLIMITED))
+    set_row(work, layout.MOST_DAMPER, spread(work, UNLIMITED))
     set_row(work, layout.FLAGS, spread(work, 1.0))
     helical = layout.is_helical(group)
     for _ in range(ROUNDS):

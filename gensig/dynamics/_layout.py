@@ -19,7 +19,6 @@ MOST_PAIRS = 8  # that may be followed at once; spur gears have 4
 # m: a pair is followed through a step if its gap exceeds the approach by less than this;
 # no pair approaches faster
 NEAR = 2e-5
-UNLIMITED = 1e30  # N s/m
 FAR, YIELDING = 1.0, 1e30  # gap in m and compliance in m/N of an absent pair
 FAR_NEAR = (
     1e-4  # m: approaches below need only the pairs between FIRST_NEAR and LAST_NEAR
