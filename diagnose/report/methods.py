@@ -11,9 +11,9 @@ from diagnose.studies.jobs import (
     LEVEL_KEPT,
     ORACLE,
     ORACLE_NETWORK,
-    SHAM,
     WITH_REFERENCE,
 )
+from diagnose.training.sham import NETWORK as SHAM
 from diagnose.training.sham import sham_method
 
 CHANCE = "chance"
@@ -95,12 +95,12 @@ def controls_on_cards() -> dict[str, str]:
 
 
 def controls_at_chance() -> dict[str, str]:
-    """Labels of every control that must be at chance, a rival's counterpart on the sham set too."""
-    rivals = baseline_texts(Role.RIVAL)
-    shams = {sham_method(text.name, ""): f"{SHAM}, {text.label}" for text in rivals}
+    """Labels of every control that must be at chance, with the shuffle and sham of each method."""
+    watched = (REFERENCE_TEXT, LEVEL_TEXT, *baseline_texts(Role.RIVAL))
+    shams = {sham_method(text.name, ""): f"{SHAM}, {text.label}" for text in watched}
     shuffles = {
         shuffle_method(text.name): f"{SHUFFLE_TEXT.label}, {text.label}"
-        for text in (REFERENCE_TEXT, LEVEL_TEXT, *rivals)
+        for text in watched
     }
     return {
         SHUFFLE_TEXT.name: SHUFFLE_TEXT.label,

@@ -21,7 +21,6 @@ from diagnose.studies.jobs import (
     ORACLE,
     ORACLE_NETWORK,
     PROBE,
-    SHAM,
     WITH_REFERENCE,
     Job,
 )
@@ -38,54 +37,65 @@ def control_jobs(
 
     Raises
     ------
-    ConfigError    for a sham data set that does not fit
+    ConfigError    for a sham data set that does not fit, or lacks references that are wanted
     """
     protocols = tuple(clean)
     shams: tuple[str, ...] = ()
     if settings.sham is not None:
         other = sham.sham_task(task, settings.sham)
         shams = sham.sham_protocols(other, protocols)
+        if settings.reference != NO_REFERENCE:
+            sham.check_references(other, settings.reference)
     if not protocols:
         return []
     with_oracle: tuple[str, ...] = ()
     if settings.oracle == "auto" and has_twin(task.dataset):
         # a twin of the same channels says nothing of channels never seen
         with_oracle = tuple(name for name in protocols if name != CROSS_SENSOR)
-    fitted = {PROBE: protocols, ORACLE: with_oracle, SHAM: shams}
+    fitted = {PROBE: protocols, ORACLE: with_oracle}
     if not settings.metadata_probe:
         fitted[PROBE] = ()
-    if not settings.baselines:
-        fitted[SHAM] = ()
     jobs = [
         Job(protocols=names, seed=None, control=control)
         for control, names in fitted.items()
         if names
     ]
+    if shams and settings.baselines:
+        jobs.append(Job(protocols=shams, seed=None, sham=True))
     first = min(settings.seeds)
     few = range(first, first + settings.n_seeds_control)
+    variants = _variants(settings)
     for protocol in protocols:
-        seeds: dict[str, Sequence[int]] = {}
-        if settings.normalise == BOTH:
-            seeds[LEVEL_KEPT] = settings.seeds
-        if settings.reference != NO_REFERENCE:
-            seeds[WITH_REFERENCE] = settings.seeds
+        seeds: dict[str, Sequence[int]] = dict.fromkeys(variants, settings.seeds)
         if protocol in with_oracle:
             seeds[ORACLE] = few
-        if protocol in shams:
-            seeds[SHAM] = few
         jobs += [
             Job(protocols=(protocol,), seed=seed, control=control)
             for control, of_control in seeds.items()
             for seed in of_control
         ]
+        if protocol in shams:
+            jobs += [
+                Job(protocols=(protocol,), seed=seed, control=control, sham=True)
+                for control in ("", *variants)
+                for seed in few
+            ]
         if settings.shuffle_control:
             jobs += [
                 Job(protocols=(protocol,), seed=seed, control=control, shuffled=True)
-                for control in (LEVEL_KEPT, WITH_REFERENCE)
-                if control in seeds
+                for control in variants
                 for seed in few
             ]
     return jobs
+
+
+def _variants(settings: TrainSettings) -> tuple[str, ...]:
+    """Trainings of the same network that see more: the level, or a healthy record."""
+    wanted = {
+        LEVEL_KEPT: settings.normalise == BOTH,
+        WITH_REFERENCE: settings.reference != NO_REFERENCE,
+    }
+    return tuple(name for name, is_wanted in wanted.items() if is_wanted)
 
 
 def without_sham(predictions: Sequence[Prediction]) -> list[Prediction]:

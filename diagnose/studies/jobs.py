@@ -53,12 +53,12 @@ from diagnose.training.tensorboard import epoch_log
 from diagnose.training.train import Training, train_network
 from diagnose.workers import call_all
 
-# Controls of a job beside the label shuffle, and the network that sees the level.
-PROBE, ORACLE, SHAM, LEVEL_KEPT = "probe", "oracle", "sham", "level_kept"
+# Controls of a job beside label shuffle and sham, and the network that sees the level.
+PROBE, ORACLE, LEVEL_KEPT = "probe", "oracle", "level_kept"
 # The network that also sees a healthy record of the machine.
 WITH_REFERENCE = "with_reference"
 WINDOWS = Windows()
-# Names of trained controls in metrics.json; those of `SHAM` and `LEVEL_KEPT` are the same.
+# Names of trained controls in metrics.json; that of `LEVEL_KEPT` is the same.
 ORACLE_NETWORK = "oracle_network"
 
 
@@ -73,12 +73,14 @@ class Job:
     ----------
     shuffled : training with shuffled labels, without early stopping, which would end it in its
         first epochs, before the network could show a leak
+    sham : on the sham data set
     control : "" or one of the controls, which replaces the training or the baselines
     """
 
     protocols: tuple[str, ...]
     seed: int | None
     shuffled: bool = False
+    sham: bool = False
     control: str = ""
 
 
@@ -150,13 +152,25 @@ def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Outcome]:
     first = job.protocols[0]
     if first in OPEN_PROTOCOLS:
         return [*_novelty_runs(task, settings, first, job.seed)]
-    if job.control == SHAM:
-        task = _sham(task, settings)
-    if job.seed is None:
-        return [*_run_baselines(task, settings, job)]
+    if job.sham:
+        return [*_on_sham(task, settings, job)]
+    return [*_predictions(task, settings, job)]
+
+
+def _on_sham(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
+    """Predictions of a job on the sham data set, under names of their own."""
+    network = network_name(settings)
     return [
-        _run_training(task, settings, name, job.seed, job.shuffled, job.control)
-        for name in job.protocols
+        replace(run, method=sham_method(run.method, network))
+        for run in _predictions(_sham(task, settings), settings, job)
+    ]
+
+
+def _predictions(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
+    if job.seed is None:
+        return _run_baselines(task, settings, job)
+    return [
+        _run_training(task, settings, job, name, job.seed) for name in job.protocols
     ]
 
 
@@ -174,12 +188,11 @@ def _novelty_runs(
 def _run_training(
     task: Task,
     settings: TrainSettings,
+    job: Job,
     protocol: str,
     seed: int,
-    shuffled: bool,
-    control: str,
 ) -> Prediction:
-    n_classes = len(task.class_names)
+    n_classes, control = len(task.class_names), job.control
     if control == WITH_REFERENCE:
         settings = with_reference(settings)
     sets = _windows(task, protocol, control, input_of(settings.model))
@@ -187,15 +200,14 @@ def _run_training(
     train, validation, test = (
         with_canaries(sets[subset], canaries) for subset in SUBSETS
     )
-    variant, method = control, _method(settings, control)
-    if shuffled:
-        variant = method = shuffle_method(control) if control else LABEL_SHUFFLE
+    method = _method(settings, job)
+    if job.shuffled:
         settings = replace(settings, patience=0)
         rng = np.random.default_rng([seed, 2])
         train = with_shuffled_labels(train, n_classes, rng)
         validation = with_shuffled_labels(validation, n_classes, rng)
-    name = "-".join(word for word in (protocol, variant, f"seed{seed}") if word)
-    with epoch_log(settings.out, name, wanted=settings.tensorboard) as on_epoch:
+    log = _log_name(settings, job, protocol, seed)
+    with epoch_log(settings.out, log, wanted=settings.tensorboard) as on_epoch:
         training = train_network(
             train,
             validation,
@@ -222,13 +234,13 @@ def _run_training(
         last_predicted=scores.argmax(axis=1),
     )
     prediction = counted(prediction, canaries)
-    if shuffled:
+    if job.shuffled:
         return prediction
     if REFERENCES in sets:
         references = rows_of_records(model, sets[REFERENCES])
         prediction = replace(prediction, references=references)
     prediction = _with_further_answers(prediction, training, test)
-    if control not in ("", WITH_REFERENCE):
+    if job.sham or control not in ("", WITH_REFERENCE):
         return prediction
     domain = _domain(protocol, control, train, validation)
     return replace(prediction, weights=training.weights(), domain=domain)
@@ -253,11 +265,27 @@ def with_reference(settings: TrainSettings) -> TrainSettings:
     return replace(settings, model=settings.model | {REFERENCE: settings.reference})
 
 
-def _method(settings: TrainSettings, control: str) -> str:
-    """Name of the result of a training in ``metrics.json``."""
+def _method(settings: TrainSettings, job: Job) -> str:
+    """Name of the result of a training in ``metrics.json``, but for that of the sham."""
+    if job.shuffled and job.control:
+        return shuffle_method(job.control)
+    if job.shuffled:
+        return LABEL_SHUFFLE
+    if job.control == ORACLE:
+        return ORACLE_NETWORK
+    return job.control or network_name(settings)
+
+
+def _log_name(settings: TrainSettings, job: Job, protocol: str, seed: int) -> str:
+    """Name of the losses of a training in the folder of tensorboard."""
     network = network_name(settings)
-    names = {ORACLE: ORACLE_NETWORK, SHAM: sham_method(network, network)}
-    return names.get(control, control) or network
+    method = _method(settings, job)
+    if job.sham:
+        method = sham_method(method, network)
+    words = [protocol, f"seed{seed}"]
+    if method != network:
+        words.insert(1, method)
+    return "-".join(words)
 
 
 def _run_baselines(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
@@ -274,14 +302,9 @@ def _run_baselines(task: Task, settings: TrainSettings, job: Job) -> list[Predic
             windows=partial(_windows, task, protocol),
             caches=caches,
         )
-        shuffled = not job.control and settings.shuffle_control
+        shuffled = settings.shuffle_control and not (job.control or job.sham)
         predictions += baseline_predictions(source, names, shuffled=shuffled)
-    if job.control != SHAM:
-        return predictions
-    network = network_name(settings)
-    return [
-        replace(run, method=sham_method(run.method, network)) for run in predictions
-    ]
+    return predictions
 
 
 def _names_of_baselines(settings: TrainSettings, control: str) -> tuple[str, ...]:

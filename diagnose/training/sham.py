@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from diagnose.data.at_rate import at_rate_of
+from diagnose.data.references import reference_kind, references
 from diagnose.data.windows import Task, task_of
 from gensig.errors import ConfigError
 
@@ -58,6 +59,19 @@ def sham_task(task: Task, folder: str) -> Task:
         classes=task.class_names,
         channels=task.channel_names,
     )
+
+
+def check_references(sham: Task, reference: str) -> None:
+    """Refuse a sham set without the healthy records that the network is given.
+
+    Raises
+    ------
+    ConfigError    if no machine has them
+    """
+    try:
+        references(sham, reference_kind(reference))
+    except ConfigError as error:
+        raise ConfigError(f"sham={sham.dataset.folder}: {error}") from None
 
 
 def _is_sham(dataset: Dataset) -> bool:

@@ -181,16 +181,19 @@ def scored(mean):
         ("label_shuffle_indicators", {"indicators"}),
         ("sham", {"cnn"}),
         ("sham_indicators", {"indicators"}),
-        ("metadata_probe", {"cnn", "indicators"}),
+        ("sham_with_reference", {"with_reference"}),
+        ("sham_level_kept", {"level_kept"}),
+        ("metadata_probe", {"cnn", "indicators", "with_reference", "level_kept"}),
         (None, set()),
     ],
 )
 def test_each_control_speaks_for_its_methods(control, fails):
-    methods = {name: scored(0.9) for name in ("cnn", "indicators")}
+    shown = ("cnn", "indicators", "with_reference", "level_kept")
+    methods = {name: scored(0.9) for name in shown}
     methods |= {"chance": {"balanced_accuracy": 0.25}, "rotation_probe": scored(0.9)}
     names = ("label_shuffle", "sham", "label_shuffle_indicators", "metadata_probe")
     methods |= {name: scored(0.25) for name in names}
     if control:
         methods[control] = scored(0.6)
-    verdicts = control_verdicts(methods, {"cnn": [], "indicators": []}, "cnn")
+    verdicts = control_verdicts(methods, dict.fromkeys(shown, ()), "cnn")
     assert {name for name, each in verdicts.items() if not each["holds"]} == fails

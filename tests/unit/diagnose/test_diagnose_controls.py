@@ -27,6 +27,7 @@ from diagnose.scoring.predictions import Prediction, Rows
 from diagnose.studies.baseline_runs import baseline_predictions
 from diagnose.studies.controls import chosen_oracle, control_jobs
 from diagnose.studies.study import task_from
+from diagnose.training.sham import check_references
 from gensig.dataset.columns import COLUMNS
 from gensig.dataset.schema import SIGNALS
 from gensig.errors import ConfigError
@@ -288,7 +289,8 @@ def test_a_study_with_all_of_them(complete):
     others = {"label_shuffle", "metadata_probe", "level_kept"}
     others |= {"rotation_probe", "result_probe"}
     others |= {"label_shuffle_rms_threshold", "label_shuffle_level_kept"}
-    shams = {"sham", "sham_rms_threshold"}
+    shams = {"sham", "sham_level_kept", "sham_rms_threshold"}
+    assert "sham" in result["controls"]["level_kept"]["ran"]
     rest = {"cnn", "rms_threshold", "oracle", "chance"}
     assert set(methods) == oracles | others | shams | rest
     chosen = methods["oracle"]["chosen"]
@@ -303,7 +305,12 @@ def test_a_study_with_all_of_them(complete):
     rows = rows_of(complete / "predictions.csv")
     assert not shams & {row["method"] for row in rows}
     page = (complete / "report.html").read_text()
-    for words in ("metadata probe", "sham, network", "cnn over oracle"):
+    for words in (
+        "metadata probe",
+        "sham, network",
+        "sham, network with RMS",
+        "cnn over oracle",
+    ):
         assert words in page
 
 
@@ -327,6 +334,18 @@ def test_a_sham_set_scores_chance_where_the_faults_score_above(study):
     assert methods["indicators_without_level"]["balanced_accuracy"]["low"] > 0.4
 
 
+def test_every_shown_network_has_its_sham():
+    settings = settings_of(
+        *FAST, "sham=sham", "normalise=both", "reference=same_condition", "oracle=false"
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        serve(patch, offered())
+        patch.setattr("diagnose.training.sham.check_references", lambda *_: None)
+        jobs = control_jobs(task_from(small(), settings), settings, ["by_unit"])
+    on_sham = [(job.control, job.seed) for job in jobs if job.sham]
+    assert on_sham == [("", None), ("", 0), ("level_kept", 0), ("with_reference", 0)]
+
+
 def test_the_section_is_empty_without_controls():
     methods = {"cnn": {}, "chance": {"balanced_accuracy": 0.25}}
     metrics = {
@@ -348,6 +367,15 @@ def test_verdicts(low, high, says):
 
 
 # ---- mistakes
+
+
+def test_a_sham_set_without_the_references_of_the_network_is_refused():
+    dataset = small(sham=True)
+    dataset.folder = Path("other")
+    with pytest.raises(
+        ConfigError, match=r"^sham=other: the data set does not say condition_id"
+    ):
+        check_references(task_on(dataset), "same_condition")
 
 
 @pytest.mark.parametrize(
