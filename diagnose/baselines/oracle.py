@@ -41,10 +41,10 @@ def oracle_windows(
 
     Both have the same divisor: with ``normalise=rms`` the twin's RMS over the stretch, channel by
     channel. Record and difference hold the same as record and twin, but no kernel has to learn to
-    subtract.
+    subtract. Redraws have no twin, so an oracle has none.
     """
-    read = _record_and_difference
-    windows = inputs.load(task, segments, training=training, read=read)
+    stored, read = inputs.of_stored_records, _record_and_difference
+    windows = stored.load(task, segments, training=training, read=read)
     return replace(windows, normalise="none")
 
 

@@ -76,6 +76,11 @@ class NetworkInput(ABC):
         """True if the input compares a record with healthy ones of its machine."""
         return False
 
+    @property
+    def of_stored_records(self) -> Self:
+        """The same input without examples that a training draws beside its records."""
+        return self
+
     @classmethod
     @abstractmethod
     def completed(

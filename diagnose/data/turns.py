@@ -150,6 +150,11 @@ class Turns(NetworkInput):
         return self.reference != NO_REFERENCE
 
     @property
+    def of_stored_records(self) -> Self:
+        """The same turns without redraws."""
+        return replace(self, redraws=0)
+
+    @property
     def n_kinds(self) -> int:
         """Number of turns of either gear in an input."""
         return 1 + self.unexplained + self.compares

@@ -8,6 +8,7 @@ from fake_dataset import N_TEETH, FakeDataset
 from numpy.testing import assert_allclose, assert_array_equal
 from small_studies import study_of
 
+from diagnose.baselines.oracle import oracle_windows
 from diagnose.data.inputs import RecordedSignal, SoundSignal
 from diagnose.data.redrawn_sets import SOURCE, TWIN, RedrawnTurns
 from diagnose.data.redraws import Redraws
@@ -179,6 +180,14 @@ def test_a_training_has_the_redraws_behind_its_records_and_nothing_else_has(data
     for one, other in zip(trained.signals, again.signals, strict=True):
         assert_array_equal(one, other)
         assert np.isfinite(one).all()
+
+
+def test_the_oracle_has_records_alone_for_a_redraw_has_no_twin(dataset):
+    task, inputs = inputs_of(dataset, "model.redraws=2", "model.halves=false")
+    segments = subset_segments(task, "by_unit", "train")
+    seen = oracle_windows(task, segments, inputs, training=True)
+    assert_array_equal(seen.record, segments.record)
+    assert {len(signal) for signal in seen.signals} == {2 * len(task.channel_names)}
 
 
 def test_a_recording_is_prepared_as_a_record_with_its_sound_records_is(dataset):
