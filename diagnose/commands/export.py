@@ -18,7 +18,7 @@ rate, window and temperature are in its metadata. The file of a model of remaini
 the values that the model must know (window, column), and gives hours."""
 EXAMPLE = """\
 example:
-  diagnose export --to onnx --model report/models/new_machine-seed0 --out gearbox.onnx"""
+  diagnose export --to onnx --model runs/cnn/models/new_machine-seed0 --out gearbox.onnx"""
 
 
 def add_arguments(parser: ArgumentParser) -> None:

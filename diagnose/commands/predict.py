@@ -37,7 +37,7 @@ out of it is scored."""
 EXAMPLE = """\
 examples:
   diagnose predict mine.wav --teeth 23 46 --speed-rpm 1800
-  diagnose predict --model report/models/new_machine-seed0 a.wav --channels left --speed-rpm 1500
+  diagnose predict --model report/models/new_machine-seed0 a.csv --channels left --speed-rpm 1500
   diagnose predict --model report/models/new_machine-seed0 runup.csv --tacho pulses
   diagnose predict --model report/models/new_machine-seed0 bench.csv --teeth 23 84 --speed-rpm 1500
   diagnose predict --model runs/mine_report/models/new_machine-seed0 monday.csv --held-out

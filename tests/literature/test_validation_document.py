@@ -14,6 +14,8 @@ from validation.pages import PAGES
 from validation.rows import DIFFERS, FAILS, SOURCES, VERDICTS
 from validation.verdicts import evaluate, run_validation
 
+from gensig.cli import main
+
 DOCS = Path(__file__).parents[2] / "docs"
 MOST_WORDS = 1500
 NUMBER = re.compile(r"(~)?[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?( %)?")
@@ -82,6 +84,15 @@ def test_pages_are_in_step(pages):
     assert not wrong, (
         "run: gensig validate --markdown docs/validation.md\n" + "\n".join(wrong[:5])
     )
+
+
+def test_the_verb_writes_these_pages(results, pages, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("validation.verdicts.run_validation", lambda: results)
+    page = tmp_path / "docs" / "validation.md"
+    assert main(["validate", "--markdown", str(page)]) == 0
+    written = {name: (page.parent / name).read_text("utf-8") for name in pages}
+    assert written == pages
+    assert "rows" in capsys.readouterr().out
 
 
 def test_no_other_page_is_there(pages):
