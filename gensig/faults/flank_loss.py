@@ -108,9 +108,18 @@ def remove_patch(tooth: Tooth, patch: Patch, name: str) -> Tooth:
 
 def patch_loss(tooth: Tooth, patch: Patch) -> Array:
     """Depth of a patch on the nodes of the flank, (slice, profile) m."""
-    reach = 0.5 * patch.height_at(tooth.slice_middle)[:, None]
-    inside = np.abs(tooth.profile.flank_abscissa - patch.abscissa) <= reach
-    return np.where(inside & (reach > 0.0), patch.depth, 0.0)
+    loss = np.zeros((len(tooth.slice_width), len(tooth.profile.flank_abscissa)))
+    deepen(loss, tooth, patch)
+    return loss
+
+
+def deepen(loss: Array, tooth: Tooth, patch: Patch) -> None:
+    """Write the depth of a patch where it exceeds that of others, ``loss`` (slice, profile) m."""
+    height = patch.height_at(tooth.slice_middle)
+    rows = np.flatnonzero(height > 0.0)
+    along = np.abs(tooth.profile.flank_abscissa - patch.abscissa)
+    inside = along <= 0.5 * height[rows, None]
+    loss[rows] = np.maximum(loss[rows], np.where(inside, patch.depth, 0.0))
 
 
 def patch_edge(tooth: Tooth, patch: Patch) -> Array:

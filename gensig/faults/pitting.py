@@ -21,10 +21,10 @@ from gensig.faults.base import (
 from gensig.faults.flank_loss import (
     SHAPES,
     Patch,
+    deepen,
     flank_area,
     flank_ends,
     patch_edge,
-    patch_loss,
     pitch_abscissa,
     remove_patch,
     require_edge,
@@ -233,13 +233,15 @@ class DistributedPitting(Fault):
         heights = np.gradient(sliced.profile.flank_abscissa)
         cell_area = np.outer(sliced.slice_width, heights) / flank_area(gear)
         loss, edge = np.zeros_like(cell_area), np.zeros_like(cell_area)
-        if self.pit_edge_height > 0.0:
+        is_raised = self.pit_edge_height > 0.0
+        if is_raised:
             require_edge(tooth, self.pit_edge_width, "pit_")
         ends = flank_ends(gear)
         for _ in range(MOST_PITS):
             pit = self._draw(rng, ends, gear.face_width)
-            loss = np.maximum(loss, patch_loss(sliced, pit))
-            edge = np.maximum(edge, patch_edge(sliced, pit))
+            deepen(loss, sliced, pit)
+            if is_raised:
+                edge = np.maximum(edge, patch_edge(sliced, pit))
             if float(cell_area[loss > 0.0].sum()) >= self.pitted_share:
                 raised = np.where(loss > 0.0, 0.0, edge)
                 return sliced.with_loss(loss).with_deviation(-raised)

@@ -35,8 +35,11 @@ def lower_envelope(standing_back, arc, center, relative_radius, gap):
     gap : (slice, node) m                 written
     """
     n_profile = arc.shape[0]
+    slope = np.empty(n_profile - 1)
     for i in range(standing_back.shape[0]):
         back = standing_back[i]
+        for j in range(n_profile - 1):
+            slope[j] = (back[j + 1] - back[j]) / (arc[j + 1] - arc[j])
         # NumPy's least and search would take most of this function's compile time
         lowest = np.inf
         for j in range(n_profile):
@@ -50,34 +53,37 @@ def lower_envelope(standing_back, arc, center, relative_radius, gap):
                 else:
                     end = half
             least = np.inf
+            if 0 < middle < n_profile:
+                least = _between(
+                    back, arc, slope, middle - 1, center[k], relative_radius[k]
+                )
             for direction in (1, -1):
                 j = middle if direction == 1 else middle - 1
                 while 0 <= j < n_profile:
                     x = arc[j] - center[k]
-                    if lowest + x * x / (2.0 * relative_radius[k]) >= least:
+                    drop = x * x / (2.0 * relative_radius[k])
+                    if lowest + drop >= least:
                         break
-                    least = min(least, back[j] + x * x / (2.0 * relative_radius[k]))
-                    if j + 1 < n_profile:
-                        least = min(
-                            least, _between(back, arc, j, center[k], relative_radius[k])
+                    least = min(least, back[j] + drop)
+                    farther = (
+                        j if direction == 1 else j - 1
+                    )  # the cell beyond this node
+                    if 0 <= farther < n_profile - 1:
+                        beyond = _between(
+                            back, arc, slope, farther, center[k], relative_radius[k]
                         )
-                    if j > 0:
-                        least = min(
-                            least,
-                            _between(back, arc, j - 1, center[k], relative_radius[k]),
-                        )
+                        least = min(least, beyond)
                     j += direction
             gap[i, k] = least
 
 
 @_compiled
-def _between(back, arc, j, center, radius):
+def _between(back, arc, slope, j, center, radius):
     """Minimum between nodes j and j + 1; inf if it is at a node, or if a node is missing."""
-    slope = (back[j + 1] - back[j]) / (arc[j + 1] - arc[j])
-    x = -radius * slope
-    if not np.isfinite(slope) or x <= arc[j] - center or x >= arc[j + 1] - center:
+    x = -radius * slope[j]
+    if not np.isfinite(x) or x <= arc[j] - center or x >= arc[j + 1] - center:
         return np.inf
-    return back[j] + slope * (x - arc[j] + center) + x * x / (2.0 * radius)
+    return back[j] + slope[j] * (x - arc[j] + center) + x * x / (2.0 * radius)
 
 
 @_compiled
@@ -97,6 +103,19 @@ def _sort_slices(gap, order):
             order[j] = order[j - 1]
             j -= 1
         order[j] = one
+
+
+@_compiled
+def _is_repeated(k, slice_gap, load, constant, bending):
+    """True if node k has the inputs of the node before, as all have beyond the path of contact."""
+    if load[k] != load[k - 1] or constant[k] != constant[k - 1]:
+        return False
+    if bending[k] != bending[k - 1]:
+        return False
+    n_same, n_slices = 0, slice_gap.shape[0]
+    while n_same < n_slices and slice_gap[n_same, k] == slice_gap[n_same, k - 1]:
+        n_same += 1
+    return n_same == n_slices
 
 
 @_compiled
@@ -120,6 +139,9 @@ def share_over_slices(
     n_slices, full = width.shape[0], width.sum()
     order, unit = np.arange(n_slices), np.empty(n_slices)
     for k in range(load.shape[0]):
+        if k > 0 and _is_repeated(k, slice_gap, load, constant, bending):
+            gap[k], compliance[k] = gap[k - 1], compliance[k - 1]
+            continue
         _sort_slices(slice_gap[:, k], order)
         first, even = slice_gap[order[0], k], load[k] / full
         unit[:] = factor * (constant[k] - log_weight * np.log(even)) + bending[k]

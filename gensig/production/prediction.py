@@ -41,6 +41,7 @@ class FailedRecordsWarning(UserWarning):
 def predict(
     reader: InputReader,
     *,
+    table: Plan | None = None,
     on_plan: Callable[[Plan, int], None] = lambda _plan, _n_timed: None,
 ) -> dict[str, str]:
     """Facts of a data set that is not made yet, by name, as text; ``varies`` has a line a key.
@@ -51,11 +52,13 @@ def predict(
 
     Parameters
     ----------
+    table : the plan, if it is made already, which then costs no time any more
     on_plan : called with the plan and the number of records, before the first is made
     """
     started = time.process_time()  # what a process spends before its first record
     begin = time.monotonic()
-    table = make_plan(reader.config)
+    if table is None:
+        table = make_plan(reader.config)
     planning = time.monotonic() - begin
     first = table.rows(0)[: block_length(reader.machine())]
     probe = [table.record(int(index)) for index in first]

@@ -247,8 +247,9 @@ def _plan(job: Job, *, freeze: bool) -> None:
     from gensig.record.inputs import InputReader
 
     reader, out = InputReader(job.request.config), job.folder
+    frozen: Plan | None = None
     if freeze and out is not None:
-        begin_folder(reader.config, job.request.overrides, out)
+        frozen = begin_folder(reader.config, job.request.overrides, out)
         show(
             f"{out} is planned; gensig resume {out} makes it here, "
             "tasks with executor=slurm as an array job"
@@ -259,6 +260,6 @@ def _plan(job: Job, *, freeze: bool) -> None:
         note(*plan_doubts(reader, table))
         step(f"making {n_timed} of {table.n_records} records to time them")
 
-    for name, value in predict(reader, on_plan=on_plan).items():
+    for name, value in predict(reader, table=frozen, on_plan=on_plan).items():
         first, *others = value.split("\n")
         show(f"{name:<11}{first}", *[f"{'':<11}{other}" for other in others])

@@ -318,6 +318,23 @@ def approach_of(law, slice_gap, width, load, bending):
     return gap + (compliance + bending / width.sum()) * load
 
 
+def test_a_repeated_node_is_shared_as_one_that_stands_alone(xiamen):
+    """Nodes beyond the path have the inputs of its end, and the answer too, to the bit."""
+    at = np.array([0.3, 0.3, 0.3, 0.6, 0.6]) * xiamen.pair.path_of_contact
+    law = weber_contact(xiamen.pair, at, xiamen.material)
+    rng = np.random.default_rng(3)
+    gaps = np.repeat(rng.uniform(0, 2e-6, (4, 2)), [3, 2], axis=1)
+    gaps[2, 2] *= 0.5  # the third node is another one
+    load = np.array([500.0, 500.0, 500.0, 800.0, 900.0])
+    width = np.full(4, 4e-3)
+    together = np.array(shared(law, gaps, width, load, 0.0))
+    for node in range(len(at)):
+        alone = weber_contact(xiamen.pair, at[[node]], xiamen.material)
+        expected = shared(alone, gaps[:, [node]], width, load[[node]], 0.0)
+        np.testing.assert_array_equal(together[:, [node]], expected)
+    assert together[1, 0] == together[1, 1] != together[1, 2]
+
+
 @pytest.fixture(scope="module", params=["linear", "weber"])
 def law(request, xiamen):
     """The two contact laws at ten positions of the path."""
