@@ -16,6 +16,8 @@ from gensig.compilation import watch
 watch()
 _compiled: Any = functools.partial(njit, nogil=True, cache=True, error_model="numpy")()
 
+BLOCK = 8  # nodes of a flank that are passed over together where none can touch
+ROUNDING = 1e-18  # m, above that of a gap
 ROUNDS = 40  # at most, of the logarithm's load: each leaves about a tenth of the error
 # of the even load per width: the logarithm has no limit as a slice loses contact
 LEAST_INTENSITY = 1e-3
@@ -36,10 +38,12 @@ def lower_envelope(standing_back, arc, center, relative_radius, gap):
     """
     n_profile = arc.shape[0]
     slope = np.empty(n_profile - 1)
+    block_low = np.empty((n_profile + BLOCK - 1) // BLOCK)
     for i in range(standing_back.shape[0]):
         back = standing_back[i]
         for j in range(n_profile - 1):
             slope[j] = (back[j + 1] - back[j]) / (arc[j + 1] - arc[j])
+        _lowest_of_blocks(back, block_low)
         # NumPy's least and search would take most of this function's compile time
         lowest = np.inf
         for j in range(n_profile):
@@ -64,17 +68,32 @@ def lower_envelope(standing_back, arc, center, relative_radius, gap):
                     drop = x * x / (2.0 * relative_radius[k])
                     if lowest + drop >= least:
                         break
+                    behind = j - direction
+                    enters = behind < 0 or behind // BLOCK != j // BLOCK
+                    if enters and block_low[j // BLOCK] + drop >= least + ROUNDING:
+                        j += BLOCK * direction
+                        continue
                     least = min(least, back[j] + drop)
-                    farther = (
-                        j if direction == 1 else j - 1
-                    )  # the cell beyond this node
-                    if 0 <= farther < n_profile - 1:
+                    cell = min(j, j + direction)  # the one beyond this node
+                    if 0 <= cell < n_profile - 1:
                         beyond = _between(
-                            back, arc, slope, farther, center[k], relative_radius[k]
+                            back, arc, slope, cell, center[k], relative_radius[k]
                         )
                         least = min(least, beyond)
                     j += direction
             gap[i, k] = least
+
+
+@_compiled
+def _lowest_of_blocks(back, block_low):
+    """Write the least of each block of nodes and of the nodes next to it, (block,) m."""
+    for block in range(block_low.shape[0]):
+        first = max(block * BLOCK - 1, 0)
+        last = min((block + 1) * BLOCK, back.shape[0] - 1)
+        least = np.inf
+        for j in range(first, last + 1):
+            least = min(least, back[j])
+        block_low[block] = least
 
 
 @_compiled

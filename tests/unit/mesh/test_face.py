@@ -40,7 +40,7 @@ def gaps_at(tooth, curvature, radius=5e-3):
 class TestLowerEnvelope:
     @pytest.fixture(
         scope="class",
-        params=["rough", "smooth", "steps", "broken"],
+        params=["rough", "smooth", "steps", "broken", "pitted"],
     )
     @classmethod
     def flank(cls, request):
@@ -53,12 +53,16 @@ class TestLowerEnvelope:
             "smooth": 5,
             "steps": 0.1,
             "broken": 30,
+            "pitted": 0.01,
         }[name] * UM
         back = rng.uniform(0.0, height, (5, len(arc)))
         if name == "smooth":
             back = np.cumsum(back - back.mean(axis=1, keepdims=True), axis=1)
         if name == "steps":
             back += 500 * UM * (rng.random(back.shape) < 0.3)
+        if name == "pitted":  # floors of many nodes, which no mate reaches
+            back[:, 20:47] += 300 * UM
+            back[2:, 55:] -= 2 * UM
         if name == "broken":
             back[:, 60:] = np.inf
             back[:2, :15] = np.inf
@@ -100,6 +104,33 @@ class TestLowerEnvelope:
 
         assert np.all(exact <= result + 1e-18)
         assert_close(exact, result, atol=atol + 1e-15)
+
+    @staticmethod
+    def everywhere(back, arc, center, radius):
+        """The least of all nodes and of all cells, for one slice and one contact."""
+        slope = np.diff(back) / np.diff(arc)
+        x, away = -radius * slope, arc - center
+        cells = back[:-1] + slope * (x - arc[:-1] + center) + x * x / (2.0 * radius)
+        inside = (x > away[:-1]) & (x < away[1:])
+        nodes = back + away * away / (2.0 * radius)
+        return min(nodes.min(), cells[inside].min(initial=np.inf))
+
+    def test_what_is_passed_over_would_not_have_touched(self):
+        """Waves, and holes with an edge at every place of the nodes: equal to the bit."""
+        rng = np.random.default_rng(5)
+        arc = np.cumsum(rng.uniform(10.0, 14.0, 300)) * UM
+        back = np.cumsum(rng.normal(0.0, 0.05, (40, 300)), axis=1) * UM
+        for row, first in enumerate(rng.integers(0, 200, 40)):
+            back[row, first : first + 60] += 5 * UM
+        center = np.sort(rng.uniform(arc[0] - 50 * UM, arc[-1] + 50 * UM, 90))
+        radius = rng.uniform(2e-3, 12e-3, 90)
+        expected = [
+            [self.everywhere(row, arc, *at) for at in zip(center, radius, strict=True)]
+            for row in back
+        ]
+        np.testing.assert_array_equal(
+            self.compiled(back, arc, center, radius), expected
+        )
 
     def test_a_whole_flank_touches_where_it_should(self, flank):
         _, arc, center, radius = flank
