@@ -20,7 +20,8 @@ from diagnose.baselines.base import Role
 from diagnose.baselines.registry import baseline_names
 from diagnose.studies.baseline_runs import LABEL_SHUFFLE
 from diagnose.studies.benchmark import Benchmark, sha256, signal_rms
-from diagnose.studies.jobs import ORACLE_NETWORK, SHAM
+from diagnose.studies.controls import is_sham
+from diagnose.studies.jobs import ORACLE_NETWORK
 from diagnose.studies.study import is_leaky
 from gensig.dataset.reader import open_dataset
 
@@ -28,7 +29,6 @@ FOLDER = Path(__file__).parents[1] / "diagnose" / "frozen"
 N_RECORDS = 20  # whose RMS is kept
 DIGITS = 9
 CONTROLS = {
-    SHAM,
     ORACLE_NETWORK,
     *baseline_names(Role.AT_CHANCE, Role.FOLLOWER, Role.BOUND),
 }
@@ -73,6 +73,7 @@ def _results(report: Path) -> dict[str, dict[str, dict[str, float]]]:
             if isinstance(values["balanced_accuracy"], dict)
             and method not in CONTROLS
             and not method.startswith(LABEL_SHUFFLE)
+            and not is_sham(method)
         }
         for protocol, result in metrics["protocols"].items()
         if not is_leaky(protocol)
