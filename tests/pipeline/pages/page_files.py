@@ -30,7 +30,7 @@ LIVES = ("runs/hours/", "runs/remaining/")  # networks that read windows of time
 
 @dataclass(frozen=True, kw_only=True)
 class Recorded:
-    """What a command says of the recordings that it reads.
+    """The recordings that a command reads, as its words state them.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Recorded:
 
 
 def recorded(words: Sequence[str]) -> Recorded:
-    """What the words of a command say of its recordings."""
+    """The recordings of a command, read from its words."""
     said = {}
     teeth = values_behind(words, "--teeth")
     if teeth:
