@@ -43,11 +43,8 @@ def lower_envelope(standing_back, arc, center, relative_radius, gap):
         back = standing_back[i]
         for j in range(n_profile - 1):
             slope[j] = (back[j + 1] - back[j]) / (arc[j + 1] - arc[j])
-        _lowest_of_blocks(back, block_low)
+        lowest = _lowest_of_blocks(back, block_low)
         # NumPy's least and search would take most of this function's compile time
-        lowest = np.inf
-        for j in range(n_profile):
-            lowest = min(lowest, back[j])
         for k in range(center.shape[0]):
             middle, end = 0, n_profile  # the first node from the contact on
             while middle < end:
@@ -86,7 +83,11 @@ def lower_envelope(standing_back, arc, center, relative_radius, gap):
 
 @_compiled
 def _lowest_of_blocks(back, block_low):
-    """Write the least of each block of nodes and of the nodes next to it, (block,) m."""
+    """Least of all nodes, m; ``block_low`` (block,) m is written.
+
+    The least of a block counts the nodes next to it too.
+    """
+    lowest = np.inf
     for block in range(block_low.shape[0]):
         first = max(block * BLOCK - 1, 0)
         last = min((block + 1) * BLOCK, back.shape[0] - 1)
@@ -94,6 +95,8 @@ def _lowest_of_blocks(back, block_low):
         for j in range(first, last + 1):
             least = min(least, back[j])
         block_low[block] = least
+        lowest = min(lowest, least)
+    return lowest
 
 
 @_compiled
