@@ -12,9 +12,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks._phase_mesh import phase_mesh
 from gensig.driveline.time.course import ShaftTorque
 from gensig.driveline.time.geared_line import GearedLine
-from gensig.driveline.time.line_mesh import LineMesh, phase_mesh
+from gensig.driveline.time.line_mesh import LineMesh
 
 Array = NDArray[np.float64]
 

@@ -62,9 +62,9 @@ def mesh_numbers(dynamics: PairDynamics) -> MeshNumbers:
         friction=options.friction_coefficient,
         friction_half_width=0.5 * options.friction_transition * pair.base_pitch,
         backlash=pair.backlash,
-        start_roll=dynamics.start_roll,
+        start_roll=dynamics.teeth.start_roll,
         speed=dynamics.operating.speed,
-        start_pinion=dynamics.start_tooth_pinion,
-        start_wheel=dynamics.start_tooth_wheel,
+        start_pinion=dynamics.teeth.start_teeth[0],
+        start_wheel=dynamics.teeth.start_teeth[1],
         consistent=options.roll_torque == "consistent",
     )

@@ -97,7 +97,7 @@ def kernel(
     n_settling = round(SETTLING / step)
     settled = GroupRun(fill_lanes(lanes, precision), CHANNELS, precision, core)
     for lane, dynamics in enumerate(fill_lanes(lanes, precision)):
-        settled.begin(group, lane, dynamics.static_start(0.0))
+        settled.begin(group, lane, *dynamics.start(0.0))
     settled.advance(group, step, 0, n_settling)
     n_calls = round(TIMED / step / PER_CALL)
     means, nothing = (
@@ -182,7 +182,7 @@ def difference(all_of: list[PairDynamics], oversampling: int) -> float:
     group = THREE_PAIRS.pack(all_of, step, "float64", (0.0, 0.0))
     run = GroupRun(all_of, CHANNELS, "float64", THREE_PAIRS)
     for lane, dynamics in enumerate(all_of):
-        run.begin(group, lane, dynamics.static_start(0.0))
+        run.begin(group, lane, *dynamics.start(0.0))
     ours = np.empty((n_steps, len(CHANNELS), LANES))
     THREE_PAIRS.integrate(
         group,
@@ -265,7 +265,7 @@ def _numpy_right_hand_side(dynamics: PairDynamics) -> RightHandSide:
 
     def slope(time: float, state: Array) -> Array:
         q, v = state[:n_dof], state[n_dof:]
-        roll = dynamics.start_roll + radius * (speed * time + q[2])
+        roll = dynamics.teeth.start_roll + radius * (speed * time + q[2])
         motion[:] = np.array(
             [roll, direction @ q, direction @ v, radius * (speed + v[2])]
         )[:, None]

@@ -158,7 +158,7 @@ def with_table(dynamics: PairDynamics, table: SlicedTable) -> PairDynamics:
     """The same machine on another table, its gears held along their axes."""
     return replace(
         dynamics,
-        table=table,
+        teeth=replace(dynamics.teeth, table=table),
         pinion=on_axial_supports(dynamics.pinion),
         wheel=on_axial_supports(dynamics.wheel),
     )

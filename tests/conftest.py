@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import gensig.compilation
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.pair import PairDynamics
 from gensig.geometry.gear import Gear
 from gensig.options.configuration import Configuration
@@ -107,22 +108,24 @@ def dynamics_of() -> Callable[..., PairDynamics]:
             "pinion": system.pair.pinion.n_teeth,
             "wheel": system.pair.wheel.n_teeth,
         }
-        perfect = {
+        values = {
             f"{gear}_{key}": np.zeros(n)
             for gear, n in counts.items()
             for key in ("error", "tilt")
         }
+        values |= errors
         return PairDynamics(
-            table=system.mesh_table(faults),
+            teeth=MeshTeeth(
+                table=system.mesh_table(faults),
+                errors=(values["pinion_error"], values["wheel_error"]),
+                tilts=(values["pinion_tilt"], values["wheel_tilt"]),
+                start_phase=phase,
+            ),
             pinion=system.pinion,
             wheel=system.wheel,
             motor=system.motor,
             load=system.load,
             operating=system.operating,
-            **{**perfect, **errors},
-            start_tooth_pinion=0,
-            start_tooth_wheel=0,
-            start_phase=phase,
         )
 
     return make

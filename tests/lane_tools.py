@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from benchmarks import _classical_scheme
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._vector import LANES
 from gensig.dynamics.lanes import pack
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.pair import Body, PairDynamics, Support
 
 LAW = layout.Law._fields
 BRIEF = 1e-11  # s; the square of a change over such a step is 0, the slope of a gap over it is not
@@ -62,11 +63,36 @@ def law_of(dynamics: PairDynamics, step: float = 1e-6) -> Callable[..., np.ndarr
     return law
 
 
+def with_teeth(dynamics: PairDynamics, **changes) -> PairDynamics:
+    """The pair with some of its teeth's values changed."""
+    return replace(dynamics, teeth=replace(dynamics.teeth, **changes))
+
+
+def on_any_bodies(teeth, force: float, operating) -> PairDynamics:
+    """A gear pair of some teeth under a mean force in N, on bodies of 1 kg."""
+    support = Support(
+        stiffness_x=1.0,
+        stiffness_y=1.0,
+        damping_x=1.0,
+        damping_y=1.0,
+        stiffness_z=1.0,
+        stiffness_tilt=1.0,
+    )
+    body = Body(mass=1.0, inertia=1.0, support=support, tilt_inertia=1.0)
+    torque = force * teeth.pair.pinion.base_radius
+    return PairDynamics(
+        teeth=teeth,
+        pinion=body,
+        wheel=body,
+        operating=replace(operating, torque=torque),
+    )
+
+
 def motion_of(dynamics, times, q, v):
     """Roll, approach, its rate and the rate of the roll at states (time, dof), for ``laws``."""
     radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
     direction = dynamics.approach_direction()
-    roll = dynamics.start_roll + radius * (speed * times + q[..., 2])
+    roll = dynamics.teeth.start_roll + radius * (speed * times + q[..., 2])
     return roll, q @ direction, v @ direction, radius * (speed + v[..., 2])
 
 

@@ -8,11 +8,12 @@ import math
 
 import numpy as np
 
+from benchmarks._phase_mesh import phase_mesh
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time._line_mesh_kernels import mesh_law
 from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
 from gensig.driveline.time.geared_line import GearedLine, pack_meshes
-from gensig.driveline.time.line_mesh import LineMesh, phase_mesh
+from gensig.driveline.time.line_mesh import LineMesh
 from gensig.driveline.time.mesh_friction import MeshFriction, mesh_friction
 from gensig.driveline.time.newmark import LineMotion, LineSolver, _Run, _scratch
 from gensig.dynamics.pair import PairDynamics

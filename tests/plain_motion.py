@@ -45,7 +45,7 @@ def equations(
     forces[[6, 9], 1] = 1, -1
     forces[[8, 11, 8], [2, 3, 4]] = 1, 1, radius
     forces[6:] /= mass
-    start = np.array([dynamics.start_roll, 0, 0, radius * speed])
+    start = np.array([dynamics.teeth.start_roll, 0, 0, radius * speed])
     rate = np.array([radius * speed, 0, 0, 0])
 
     def slope(t, y):

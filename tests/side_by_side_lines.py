@@ -9,10 +9,9 @@ from stacked_motions import integrate, stacked
 
 from gensig.driveline.side_by_side.line_dynamics import LineDynamics
 from gensig.driveline.side_by_side.line_integration import integrate_lines
-from gensig.driveline.time.chords import sliced_pair_mesh
 from gensig.driveline.time.course import ShaftTorque, constant_speed
 from gensig.driveline.time.geared_line import GearedLine
-from gensig.driveline.time.line_mesh import pair_mesh
+from gensig.driveline.time.toothed_mesh import toothed_mesh
 from gensig.dynamics.backends.base import Integration
 from gensig.dynamics.decimation import in_band_error
 from gensig.dynamics.integrator import Solver
@@ -28,18 +27,12 @@ CHANNELS = ("pinion_x", "pinion_y", "wheel_x", "wheel_y", "wheel_rotation")
 def as_line(pair):
     """A gear pair without rotors as a line of one mesh."""
     system, damping = pair.system(), pair.mesh_damping / pair.mesh_force
-    teeth = pair.start_tooth_pinion, pair.start_tooth_wheel
-    make = sliced_pair_mesh if pair.is_helical else pair_mesh
-    mesh = make(
+    mesh = toothed_mesh(
         "pair",
-        pair.table,
+        pair.teeth,
         direction=pair.approach_direction(),
         roll_dof=PINION_ROTATION,
         damping=damping,
-        errors=(pair.pinion_error, pair.wheel_error),
-        tilts=(pair.pinion_tilt, pair.wheel_tilt),
-        start_teeth=teeth,
-        start_phase=pair.start_phase,
     )
     held = np.zeros(len(system.mass))
     held[PINION_ROTATION] = math.sqrt(pair.drive_stiffness)
@@ -67,10 +60,11 @@ def as_line(pair):
             ShaftTorque(dof=WHEEL_ROTATION, table=driven),
         ),
         mesh_force=np.array([pair.mesh_force]),
+        reference_force=np.array([pair.mesh_force]),
     )
     return LineDynamics(
         running=running,
-        pairs=(pair,),
+        teeth=(pair.teeth,),
         touched=np.arange(6)[None],
         senses=np.array([-1.0]),
         angles=(PINION_ROTATION,),

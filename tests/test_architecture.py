@@ -41,7 +41,6 @@ BORROWED = {
     "gensig.driveline.side_by_side.line_records": {
         "gensig.dynamics.backends.nystroem._line_layout",
     },
-    "gensig.driveline.time.newmark": {"gensig.dynamics._tableau"},
 }
 
 

@@ -56,6 +56,11 @@ class EngineLine:
     wheels: Mapping[str, ToothedWheel]
 
     @property
+    def has_cycle(self) -> bool:
+        """True where torques follow the cycle of an engine, False where a motor turns the line."""
+        return isinstance(self.engine, Engine)
+
+    @property
     def ratios(self) -> dict[int, float]:
         """Speed of every node over the crank's, by its number, positive."""
         speeds = np.abs(self.drive.line.speed_ratio)

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.running import (
     Governor,
-    TabulatedMesh,
     mesh_forces,
     running_line,
     steady_course,
 )
 from gensig.driveline.teeth import ToothLaw, sound_meshes
 from gensig.driveline.time.newmark import LineSolver
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.mesh.options import refuse_papers_heat
 from gensig.options.configuration import Configuration
 from gensig.systems.registry import PairParts
@@ -69,7 +69,7 @@ def read_tooth_law(config: Configuration) -> ToothLaw:
 
 def tabulated_meshes(
     machine: EngineLine, law: ToothLaw, speed: float, torque: float
-) -> dict[int, TabulatedMesh]:
+) -> dict[int, MeshTeeth]:
     """Tables of healthy teeth by the index of their mesh, each under its mean force."""
     return sound_meshes(machine, law, mesh_forces(machine, speed, torque))
 
@@ -79,7 +79,7 @@ def time_response(
     speed: float,
     torque: float,
     *,
-    tabulated: dict[int, TabulatedMesh],
+    teeth: dict[int, MeshTeeth],
     nodes: Sequence[int],
     duration: float,
 ) -> TimeResponse:
@@ -90,7 +90,7 @@ def time_response(
     SimulationError    where the energies do not balance to 1e-3
     """
     line = running_line(
-        machine, steady_course(speed, torque), governor=GOVERNOR, tabulated=tabulated
+        machine, steady_course(speed, torque), governor=GOVERNOR, teeth=teeth
     )
     speeds = [("speed", line.dof(node)) for node in nodes]
     angles = [("angle", line.dof(node)) for node in nodes]

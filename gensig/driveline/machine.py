@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from gensig.driveline import loads
 from gensig.driveline.channels import channel, channel_rows
 from gensig.driveline.engine_line import EngineLine
-from gensig.driveline.excitation.engine_torques import Engine
 from gensig.driveline.line_gears import (
     gear_channels,
     gear_names,
@@ -47,7 +46,10 @@ from gensig.driveline.running import (
     single_thread,
     steady_course,
 )
-from gensig.driveline.side_by_side.line_pairs import angle_channels, line_mesh_states
+from gensig.driveline.side_by_side.line_mesh_states import (
+    angle_channels,
+    line_mesh_states,
+)
 from gensig.driveline.side_by_side.line_records import LineSignals, simulate_lines
 from gensig.driveline.teeth import (
     MeshHeat,
@@ -183,7 +185,7 @@ class LineMachine(Machine):
     @property
     def torque_of(self) -> str:
         """The brake or the load, at the shaft that turns the line, whichever mesh is followed."""
-        if isinstance(self.engine.engine, Engine):
+        if self.engine.has_cycle:
             return "brake, at the crank"
         return "load, as the motor feels it"
 
@@ -290,9 +292,7 @@ class LineMachine(Machine):
         gears do not come back to each other after every cycle, it is the drawn one.
         """
         pinion, wheel = self.pair.pinion.n_teeth, self.pair.wheel.n_teeth
-        once_a_cycle = (
-            isinstance(self.engine.engine, Engine) and round(2.0 * self.ratio) == 1
-        )
+        once_a_cycle = self.engine.has_cycle and round(2.0 * self.ratio) == 1
         if once_a_cycle and pinion % wheel == 0:
             return tooth_pinion % wheel
         return drawn
@@ -452,9 +452,9 @@ class LineMachine(Machine):
             engine,
             operating_course(engine, self.operating, self.ratio, SETTLING),
             governor=self._governor,
-            tabulated={**others, self.mesh_number: recorded},
+            teeth={**others, self.mesh_number: recorded},
             turned=turned,
-            local_losses=self.side_by_side,
+            local_losses=self.side_by_side and not self.engine.has_cycle,
         )
 
     @property
@@ -483,7 +483,7 @@ class LineMachine(Machine):
             self.mesh_number,
             start,
             ratio=self.ratio,
-            has_cycle=isinstance(self.engine.engine, Engine),
+            has_cycle=self.engine.has_cycle,
         )
 
     def signals(self, line: RunningLine) -> list[tuple[str, int]]:

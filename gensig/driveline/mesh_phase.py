@@ -67,7 +67,7 @@ def driving_angle(
     once a cycle, the driven gear's tooth chooses the turn. A motor has no cycle: its turns are
     counted on, so that the other meshes stand as the teeth allow.
     """
-    pitches = start.tooth_pinion + start.phase - start_phase(line, number)
+    pitches = start.tooth_pinion + start.phase - start_phases(line)[number]
     turns = pitches / line.pairs[number].pinion.n_teeth
     if not has_cycle:
         return 2.0 * math.pi * (turns + start.tooth_wheel) / ratio
@@ -99,16 +99,13 @@ def first_slice_lead(pair: GearPair) -> float:
     return 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
 
 
-def start_phase(line: DriveLine, number: int, turned: float = 0.0) -> float:
-    """Pitches that the first slice of a pair of one mesh is past A.
-
-    What a mesh table takes as its start.
-    """
-    pair = line.pairs[number]
-    return (
-        float(start_rolls(line, turned)[number] + first_slice_lead(pair))
-        / pair.base_pitch
-    )
+def start_phases(line: DriveLine, turned: float = 0.0) -> list[float]:
+    """Pitches that the first slice of a pair of every mesh is past A: starts of ``MeshTeeth``."""
+    rolls = start_rolls(line, turned).tolist()
+    return [
+        (roll + first_slice_lead(pair)) / pair.base_pitch
+        for roll, pair in zip(rolls, line.pairs, strict=True)
+    ]
 
 
 def _half_teeth(pair: GearPair) -> tuple[float, float]:

@@ -21,11 +21,10 @@ from gensig.driveline.excitation.cycle import CYCLE
 from gensig.driveline.linear.forced import SteadyResponse, closed_line, steady_response
 from gensig.driveline.linear.matrices import LineMatrices
 from gensig.driveline.linear.modal import with_local_losses, with_viscous_losses
-from gensig.driveline.mesh_phase import first_slice_lead, start_rolls
-from gensig.driveline.time.chords import sliced_pair_mesh
+from gensig.driveline.mesh_phase import start_phases
 from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
 from gensig.driveline.time.geared_line import GearedLine
-from gensig.driveline.time.line_mesh import LineMesh, pair_mesh, phase_mesh
+from gensig.driveline.time.line_mesh import LineMesh, even_mesh
 from gensig.driveline.time.mesh_friction import mesh_friction
 from gensig.driveline.time.newmark import (
     LineMotion,
@@ -33,17 +32,14 @@ from gensig.driveline.time.newmark import (
     integrate_line,
     static_start,
 )
-from gensig.dynamics.mesh_statics import mean_friction_torque
+from gensig.driveline.time.toothed_mesh import toothed_mesh
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.errors import ConfigError, StepError
 from gensig.geometry.contact import GearPair
-from gensig.mesh.pair_table import PairTable
-from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.operation.setpoint import Operating
-from gensig.sensing.manufacturing import GearErrors
 
 Array = NDArray[np.float64]
 
-CONSTANT_NODES = 8  # of a pitch whose stiffness is constant
 LEAST_APPROACH = 2e-6  # m, at which a mesh that carries next to nothing is taken
 TABLE_STEP = 100.0 * math.pi / 30.0  # rad/s of the crank between tables of a run-up
 TABLE_SHARE = 0.1  # of the largest torque between them
@@ -68,20 +64,6 @@ class Governor:
 
     frequency: float
     damping_ratio: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class TabulatedMesh:
-    """A mesh with tabulated teeth: table, errors of both gears, teeth at the start.
-
-    The forms of ``errors`` are in the table. ``start_phase`` in pitches must agree with where the
-    crank stands; None follows from it.
-    """
-
-    table: PairTable | SlicedTable
-    errors: tuple[GearErrors, GearErrors] | None = None
-    start_teeth: tuple[int, int] = (0, 0)
-    start_phase: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -147,7 +129,15 @@ class RunningLine:
     linear: SteadyResponse
     mesh_force: Array
     turned: float
-    tabulated: Mapping[int, TabulatedMesh]
+    teeth: Mapping[int, MeshTeeth]
+
+    @property
+    def reference_force(self) -> Array:
+        """Forces at which contact and damping of the meshes are taken, (mesh,) N."""
+        forces = enumerate(self.mesh_force.tolist())
+        return np.array(
+            [reference_force(self.machine, m, force) for m, force in forces]
+        )
 
     def touched(self, mesh: int) -> list[int]:
         """Degrees of freedom of x, y and rotation of both gears of a mesh; -1: does not move so."""
@@ -208,7 +198,7 @@ def running_line(
     course: EngineCourse,
     *,
     governor: Governor,
-    tabulated: Mapping[int, TabulatedMesh] | None = None,
+    teeth: Mapping[int, MeshTeeth] | None = None,
     turned: float = 0.0,
     local_losses: bool = False,
 ) -> RunningLine:
@@ -216,7 +206,8 @@ def running_line(
 
     Parameters
     ----------
-    tabulated : teeth of meshes by the index of the mesh; all others hold the stiffness of the table
+    teeth : of meshes by the index of the mesh, whose start agrees with where the crank stands; all
+        other meshes hold the stiffness of the table
     turned : rad, angle of the crank in its cycle at time 0; all meshes and torques follow from it
     local_losses : whether loss factors of shafts are dampers beside them, not of modes
 
@@ -239,13 +230,13 @@ def running_line(
     return RunningLine(
         machine=machine,
         matrices=matrices,
-        line=_geared(machine, matrices, governor, mesh_force, tabulated or {}, turned),
+        line=_geared(machine, matrices, governor, mesh_force, teeth or {}, turned),
         course=nominal,
         torques=_torques(machine, matrices, course, turned, first),
         linear=linear,
         mesh_force=mesh_force,
         turned=turned,
-        tabulated=tabulated or {},
+        teeth=teeth or {},
     )
 
 
@@ -277,7 +268,7 @@ def _geared(
     matrices: LineMatrices,
     governor: Governor,
     forces: Array,
-    tabulated: Mapping[int, TabulatedMesh],
+    teeth: Mapping[int, MeshTeeth],
     turned: float,
 ) -> GearedLine:
     rotation = matrices.rigid[0]
@@ -285,17 +276,10 @@ def _geared(
     rate = 2.0 * math.pi * governor.frequency
     held = rate / math.sqrt(float(rotation @ momentum)) * momentum
     slowed = 2.0 * governor.damping_ratio / rate
-    rigid, phases = np.outer(held, held), start_rolls(machine.drive, turned)
+    rigid, phases = np.outer(held, held), start_phases(machine.drive, turned)
     meshes = tuple(
-        _mesh(
-            machine,
-            matrices,
-            number,
-            float(force),
-            tabulated.get(number),
-            float(roll),
-        )
-        for number, (force, roll) in enumerate(zip(forces, phases, strict=True))
+        _mesh(machine, matrices, number, float(force), teeth.get(number), phase)
+        for number, (force, phase) in enumerate(zip(forces, phases, strict=True))
     )
     return GearedLine(
         names=matrices.names,
@@ -306,7 +290,7 @@ def _geared(
         held=held,
         held_damping=slowed,
         meshes=meshes,
-        friction_torque=_friction_torque(machine, matrices, meshes, forces, tabulated),
+        friction_torque=_friction_torque(machine, matrices, meshes, forces, teeth),
     )
 
 
@@ -315,22 +299,14 @@ def _friction_torque(
     matrices: LineMatrices,
     meshes: Sequence[LineMesh],
     forces: Array,
-    tabulated: Mapping[int, TabulatedMesh],
+    teeth: Mapping[int, MeshTeeth],
 ) -> Array:
     """Torques on the driving shafts that make up for the mean friction of all meshes, (dof,)."""
     rotation, lost = matrices.rigid[0], 0.0
-    for number, teeth in tabulated.items():
-        mesh, force = meshes[number], float(forces[number])
-        torque = mean_friction_torque(
-            teeth.table,
-            reference_force(machine, number, force),
-            start_tooth_pinion=mesh.start_teeth[0],
-            start_tooth_wheel=mesh.start_teeth[1],
-            pinion_error=mesh.errors[0],
-            wheel_error=mesh.errors[1],
-            **_tilts(teeth),
-        )
-        lost += torque * float(rotation[mesh.roll_dof])
+    for number, of_mesh in teeth.items():
+        force = reference_force(machine, number, float(forces[number]))
+        turning = float(rotation[meshes[number].roll_dof])
+        lost += of_mesh.friction_torque(force) * turning
     numbers, torques = machine.drive.numbers, np.zeros(len(rotation))
     driving = [_dof(matrices, numbers.index(n)) for n in machine.engine.driving_nodes]
     for dof in driving:
@@ -338,58 +314,41 @@ def _friction_torque(
     return torques
 
 
-def _tilts(teeth: TabulatedMesh) -> dict[str, Array]:
-    """Tilts of the teeth of both gears in m/m, where they have errors."""
-    if teeth.errors is None:
-        return {}
-    return {"pinion_tilt": teeth.errors[0].tilt, "wheel_tilt": teeth.errors[1].tilt}
-
-
 def _mesh(
     machine: EngineLine,
     matrices: LineMatrices,
     number: int,
     force: float,
-    tabulated: TabulatedMesh | None,
-    roll: float,
+    teeth: MeshTeeth | None,
+    phase: float,
 ) -> LineMesh:
     drive = machine.drive
     pair, mesh = drive.pairs[number], drive.line.meshes[number]
     reference = reference_force(machine, number, force)
-    phase = (roll + first_slice_lead(pair)) / pair.base_pitch
     common: dict[str, Any] = {
         "name": machine.mesh_names[number],
         "direction": matrices.directions[number],
         "roll_dof": _dof(matrices, drive.line.gears[mesh.driving].node),
         # so many N s/m under the mean force; a mesh that carries less is damped less
         "damping": float(matrices.mesh_damping[number]) / reference,
-        "start_phase": phase,
     }
-    if tabulated is None:
-        stiffness = float(matrices.mesh_stiffness[number])
-        return phase_mesh(
+    if teeth is None:
+        return even_mesh(
             n_teeth=(pair.pinion.n_teeth, pair.wheel.n_teeth),
-            stiffness=np.full((1, CONSTANT_NODES), stiffness),
+            stiffness=float(matrices.mesh_stiffness[number]),
             backlash=float(matrices.backlash[number]),
             mirror=2.0 * pair.pitch_point / pair.base_pitch + 0.5,
+            start_phase=phase,
             **common,
         )
-    if tabulated.errors is not None:
-        common["errors"] = tuple(teeth.error for teeth in tabulated.errors)
-        common["tilts"] = tuple(teeth.tilt for teeth in tabulated.errors)
-    common["friction"] = mesh_friction(
-        tabulated.table,
+    friction = mesh_friction(
+        teeth.table,
         matrices.directions[number],
         _touched(machine, matrices, number),
         matrices.rigid[0],
         _sense(machine, number),
     )
-    common["start_teeth"] = tabulated.start_teeth
-    if tabulated.start_phase is not None:
-        common["start_phase"] = tabulated.start_phase
-    if isinstance(tabulated.table, SlicedTable):
-        return sliced_pair_mesh(table=tabulated.table, **common)
-    return pair_mesh(table=tabulated.table, **common)
+    return toothed_mesh(teeth=teeth, friction=friction, **common)
 
 
 def _touched(machine: EngineLine, matrices: LineMatrices, number: int) -> list[int]:

@@ -28,8 +28,9 @@ from gensig.driveline.in_time import (
     SETTLING,
     SOLVER,
 )
-from gensig.driveline.running import EngineCourse, TabulatedMesh, running_line
+from gensig.driveline.running import EngineCourse, running_line
 from gensig.driveline.time.newmark import LineMotion
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.errors import ConfigError
 
 Array = NDArray[np.float64]
@@ -107,7 +108,7 @@ def sweep_response(
     seconds: float,
     torque: float,
     *,
-    tabulated: dict[int, TabulatedMesh],
+    teeth: dict[int, MeshTeeth],
     nodes: Sequence[int],
     n_orders: int,
 ) -> Sweep:
@@ -131,7 +132,7 @@ def sweep_response(
     course = sweep_course(low, high, seconds, torque)
     share = course.speed / machine.engine.reference.speed
     course = replace(course, torque=machine.load_at(torque, share))
-    line = running_line(machine, course, governor=GOVERNOR, tabulated=tabulated)
+    line = running_line(machine, course, governor=GOVERNOR, teeth=teeth)
     names = [(kind, line.dof(node)) for kind in ("angle", "speed") for node in nodes]
     names += [("mesh_force", number) for number in range(len(machine.mesh_names))]
     motion = line.run(

@@ -17,9 +17,15 @@ from numpy.typing import NDArray
 from gensig.driveline.drive_line import DriveLine
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.line_gears import gear_names, line_gears, line_meshes
-from gensig.driveline.mesh_phase import first_slice_lead, start_rolls, tooth_angles
-from gensig.driveline.running import TabulatedMesh, named_by_side, reference_force
+from gensig.driveline.mesh_phase import (
+    first_slice_lead,
+    start_phases,
+    start_rolls,
+    tooth_angles,
+)
+from gensig.driveline.running import named_by_side, reference_force
 from gensig.driveline.time.line_mesh import mesh_start, tooth_angle
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.errors import ConfigError, FaultError, GeometryError
 from gensig.faults.base import Fault, faulty_teeth, require_gears
 from gensig.geometry.contact import SIDES, GearPair
@@ -155,21 +161,23 @@ def require_drive(pair: GearPair, slices: SliceOptions) -> None:
 
 def sound_meshes(
     machine: EngineLine, law: ToothLaw, forces: Array
-) -> dict[int, TabulatedMesh]:
+) -> dict[int, MeshTeeth]:
     """Healthy teeth of the meshes by index, each under its mean force of ``forces`` (mesh,) N.
+
+    The first node has not turned.
 
     Helical meshes only with ``system.helical_meshes=sliced``.
     """
     n_nodes = min(law.options.points_per_pitch, SOUND_NODES)
     thin = replace(law, options=replace(law.options, points_per_pitch=n_nodes))
-    meshes = {}
+    meshes, phases = {}, start_phases(machine.drive)
     for number, pair in enumerate(machine.drive.pairs):
         is_helical = pair.pinion.helix_angle != 0.0
         if is_helical and not machine.drive.slices_helical:
             continue
         law_of_pair = (law, thin)[is_helical]
         table = _table_in_line(machine, law_of_pair, number, (), float(forces[number]))
-        meshes[number] = TabulatedMesh(table=table)
+        meshes[number] = MeshTeeth.perfect(table, start_phase=phases[number])
     return meshes
 
 
@@ -215,7 +223,7 @@ def line_teeth(
     faults: Sequence[Fault],
     specimen: Specimen,
     turned: float,
-) -> dict[int, TabulatedMesh]:
+) -> dict[int, MeshTeeth]:
     """The teeth of all meshes but the followed one, by their index.
 
     Each mesh has what its two gears have there (``felt_there``), and its own mounting. Helical
@@ -230,7 +238,7 @@ def line_teeth(
     names, homes = gear_names(drive, followed), _homes(drive, followed)
     features = (*specimen.gear_forms, *faults)
     further = [number for number in range(len(drive.pairs)) if number != followed]
-    meshes = {}
+    meshes, phases = {}, start_phases(drive, turned)
     for place, number in enumerate(further):
         if not is_tabulated(drive, followed, number):
             continue
@@ -253,25 +261,28 @@ def line_teeth(
             if ends[there] == _ends(drive, homes[gear])[there]:
                 teeth = specimen.errors_of(names[gear], n_teeth)
             errors.append(teeth)
-        meshes[number] = TabulatedMesh(
+        meshes[number] = MeshTeeth(
             table=replace(table, pair=replace(table.pair, backlash=backlash)),
-            errors=(errors[0], errors[1]),
+            errors=(errors[0].error, errors[1].error),
+            tilts=(errors[0].tilt, errors[1].tilt),
             start_teeth=start_teeth(drive, followed, number, start, turned),
+            start_phase=phases[number],
         )
     return meshes
 
 
 def followed_mesh(
     table: PairTable | SlicedTable, specimen: Specimen, start: Start
-) -> TabulatedMesh:
+) -> MeshTeeth:
     """The teeth of the followed mesh, of a table that has the forms of its specimen."""
-    pinion, wheel = _gears(table.pair)
-    return TabulatedMesh(
+    pinion, wheel = (
+        specimen.errors_of(side, gear.n_teeth)
+        for side, gear in zip(SIDES, _gears(table.pair), strict=True)
+    )
+    return MeshTeeth(
         table=table,
-        errors=(
-            specimen.errors_of(SIDES[0], pinion.n_teeth),
-            specimen.errors_of(SIDES[1], wheel.n_teeth),
-        ),
+        errors=(pinion.error, wheel.error),
+        tilts=(pinion.tilt, wheel.tilt),
         start_teeth=(start.tooth_pinion, start.tooth_wheel),
         start_phase=start.phase,
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from gensig.dynamics import _layout as layout
@@ -32,7 +34,6 @@ from gensig.dynamics._layout import (
     raw_index,
     span_index,
 )
-from gensig.dynamics._tableau import CUBIC_MIDDLE
 from gensig.dynamics._vector import (
     FOUR,
     at,
@@ -50,6 +51,28 @@ from gensig.dynamics._vector import (
 )
 from gensig.dynamics._written import written
 
+
+class CubicMiddle(NamedTuple):
+    """Value and slope of a cubic half-way between two ends at a distance d.
+
+    value = value_by_values (y_0 + y_1) + value_by_slopes d (y'_0 - y'_1)
+    slope = slope_by_values (y_1 - y_0) / d - slope_by_slopes (y'_0 + y'_1)
+
+    Simpson's rule over the slopes of both ends and of the middle gives y_1 - y_0.
+    """
+
+    value_by_values: float
+    value_by_slopes: float
+    slope_by_values: float
+    slope_by_slopes: float
+
+
+CUBIC_MIDDLE = CubicMiddle(
+    value_by_values=0.5,
+    value_by_slopes=0.125,
+    slope_by_values=1.5,
+    slope_by_slopes=0.25,
+)
 NEAR_CHORD = (
     2e-7  # m: from the depth at which a chord begins, within which it may begin
 )

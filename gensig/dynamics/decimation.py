@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics._record_kernels import TOGETHER, low_pass
-from gensig.dynamics._tableau import LOW_PASS
 from gensig.dynamics._vector import LANES
 
 Array = NDArray[np.float64]
 
-PASS_SHARE, STOP_SHARE, ATTENUATION_DB = LOW_PASS
+# of the output rate: the pass band ends at 20 kHz of 51.2 kHz, the stop band begins
+PASS_SHARE, STOP_SHARE = 0.390625, 0.5
+ATTENUATION_DB = 100.0  # in the stop band
 LOWEST_HZ = 20.0
 # first halves of symmetric taps, by oversampling
 STORED = Path(__file__).with_name("low_pass.json")

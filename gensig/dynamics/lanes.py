@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,6 +16,7 @@ from gensig.dynamics._layout import COLUMNS, FAR_NEAR, Group, HelicalGroup
 from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.helical import half_lag, pitches
 from gensig.dynamics.mesh_statics import least_gaps
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.pair import PairDynamics
 from gensig.mesh.pair_table import GearTable, PairTable
 from gensig.mesh.sliced.sliced_statics import left_out_energy
@@ -54,6 +56,61 @@ def fill_lanes(dynamics: Sequence[MachineT], precision: str) -> list[MachineT]:
     return [*dynamics, *[dynamics[0]] * (n_lanes(precision) - len(dynamics))]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MeshLanes:
+    """The teeth of one mesh in every lane.
+
+    Parameters
+    ----------
+    rows : of each lane
+    exact, indices : (lane, row)    of ``Group``
+    depth : (lane, chord) m         from which chords hold, infinite for absent ones
+    bend : (lane, 4)
+    tooth_row, tooth_error, tooth_tilt : (tooth,)    pinion and wheel, lane after lane
+    """
+
+    rows: list[ToothRows]
+    exact: Array
+    indices: NDArray[np.int64]
+    depth: Array
+    bend: Array
+    tooth_row: NDArray[np.int64]
+    tooth_error: Array
+    tooth_tilt: Array
+
+    @classmethod
+    def of(cls, meshes: Sequence[MeshTeeth], turned: Array | float = 0.0) -> MeshLanes:
+        """The same mesh of all lanes, whose pinions have ``turned`` rad where states are 0."""
+        rows = [tooth_rows(mesh.table) for mesh in meshes]
+        exact = np.array([_exact_numbers(mesh) for mesh in meshes])
+        exact[:, layout.START_ROLL] += exact[:, layout.EXACT_RADIUS] * turned
+        half_cell = 0.5 / exact[:, layout.NODES_PER_METER]
+        return cls(
+            rows=rows,
+            exact=exact,
+            indices=_mesh_indices(meshes, rows),
+            depth=_chord_depths(meshes),
+            bend=np.outer(half_cell, [1.0, 0.0, 1.0, 0.0]),
+            tooth_row=np.concatenate([each.row for each in rows]),
+            tooth_error=np.concatenate([e for mesh in meshes for e in mesh.errors]),
+            tooth_tilt=np.concatenate([t for mesh in meshes for t in mesh.tilts]),
+        )
+
+    @property
+    def n_values(self) -> int:
+        """Numbers of the tables of all lanes."""
+        return sum(math.prod(each.values.shape[:3]) * COLUMNS for each in self.rows)
+
+    def table(self) -> list[Array]:
+        """Values of ``Group.table``, lane after lane."""
+        return [each.values[..., :COLUMNS].ravel() for each in self.rows]
+
+
+def side_by_side(values: Array, precision: str) -> NDArray[np.floating]:
+    """Values (lane, row...) flat, with the lanes along the last axis."""
+    return np.ascontiguousarray(np.moveaxis(values, 0, -1), dtype=precision).ravel()
+
+
 def pack(
     dynamics: Sequence[PairDynamics],
     step: float,
@@ -70,41 +127,20 @@ def pack(
     span : s    begin and end of the required course of speed and torque, where they change
     end : values after the last lane's in ``Group.table``
     """
+    packed = partial(side_by_side, precision=precision)
     lanes = fill_lanes(dynamics, precision)
-    teeth = [tooth_rows(machine.table) for machine in lanes]
+    mesh = MeshLanes.of([machine.teeth for machine in lanes])
     systems = [machine.system() for machine in lanes]
     rests = np.stack([machine.rest() for machine in lanes])
     reach = np.stack([machine.approach_direction() for machine in lanes])
     mean_force = np.array([machine.mesh_force for machine in lanes])
     numbers = np.array(
         [
-            mesh_numbers(machine, step, rest)
+            pair_numbers(machine, step, rest)
             for machine, rest in zip(lanes, rests, strict=True)
         ]
     )
-    exact = np.array([exact_numbers(machine) for machine in lanes])
-    indices = mesh_indices(lanes, teeth)
-    depth = chord_depths(lanes)
-    bend = np.outer(0.5 / exact[:, layout.NODES_PER_METER], [1.0, 0.0, 1.0, 0.0])
-
-    def joined(
-        values: Callable[[ToothRows], Array], *more: Sequence[float] | Array
-    ) -> NDArray[np.floating]:
-        of_lanes = [values(rows).ravel() for rows in teeth]
-        return np.concatenate([*of_lanes, *more], dtype=np.dtype(precision))
-
-    def of_teeth(key: str) -> Array:
-        return np.concatenate(
-            [
-                getattr(machine, f"{gear}_{key}")
-                for machine in lanes
-                for gear in ("pinion", "wheel")
-            ]
-        )
-
-    def side_by_side(values: Array) -> NDArray[np.floating]:
-        """Values (lane, row...) flat, with the lanes along the last axis."""
-        return np.ascontiguousarray(np.moveaxis(values, 0, -1), dtype=precision).ravel()
+    chords = [each.values[..., COLUMNS:].ravel() for each in mesh.rows]
 
     def stacked(name: str) -> Array:
         return np.stack([getattr(system, name) for system in systems])
@@ -120,35 +156,35 @@ def pack(
     options = lanes[0].table.options
     kind = HelicalGroup if lanes[0].is_helical else Group
     return kind(
-        numbers=side_by_side(numbers),
-        exact=exact.T.ravel(),
-        indices=indices.T.ravel(),
-        n_pairs=int(indices[:, layout.FOLLOWED].max()),
-        n_chords=depth.shape[1],
-        table=joined(lambda rows: rows.values[..., :COLUMNS], end),
-        depth=depth.astype(precision).ravel(),
-        chord_table=joined(lambda rows: rows.values[..., COLUMNS:]),
-        bend=bend.astype(precision).ravel(),
-        tooth_row=np.concatenate([rows.row for rows in teeth]),
-        tooth_error=of_teeth("error"),
-        tooth_tilt=of_teeth("tilt"),
+        numbers=packed(numbers),
+        exact=mesh.exact.T.ravel(),
+        indices=mesh.indices.T.ravel(),
+        n_pairs=int(mesh.indices[:, layout.FOLLOWED].max()),
+        n_chords=mesh.depth.shape[1],
+        table=np.concatenate([*mesh.table(), end], dtype=np.dtype(precision)),
+        depth=mesh.depth.astype(precision).ravel(),
+        chord_table=np.concatenate(chords, dtype=np.dtype(precision)),
+        bend=mesh.bend.astype(precision).ravel(),
+        tooth_row=mesh.tooth_row,
+        tooth_error=mesh.tooth_error,
+        tooth_tilt=mesh.tooth_tilt,
         one_sided=options.law == "one_sided",
         consistent=options.roll_torque == "consistent",
         prescribed=options.phase == "prescribed",
-        reach=side_by_side(reach),
-        inverse_mass=side_by_side(1.0 / mass),
-        stiffness=side_by_side(stiffness[:, dofs, dofs]),
-        damping=side_by_side(damping[:, dofs, dofs]),
+        reach=packed(reach),
+        inverse_mass=packed(1.0 / mass),
+        stiffness=packed(stiffness[:, dofs, dofs]),
+        damping=packed(damping[:, dofs, dofs]),
         other_first=np.searchsorted(row, np.arange(len(dofs) + 1)),
         other_column=np.ascontiguousarray(column),
-        other_stiffness=side_by_side(stiffness[:, row, column]),
-        other_damping=side_by_side(damping[:, row, column]),
-        force=side_by_side(set_force - np.einsum("lij,lj->li", stiffness, rests)),
-        set_force=side_by_side(set_force),
+        other_stiffness=packed(stiffness[:, row, column]),
+        other_damping=packed(damping[:, row, column]),
+        force=packed(set_force - np.einsum("lij,lj->li", stiffness, rests)),
+        set_force=packed(set_force),
         rest=np.ascontiguousarray(rests.T),
-        rotation=side_by_side(rotation),
-        held=side_by_side(np.einsum("lij,lj->li", stiffness, rotation)),
-        carried=side_by_side(mass * rotation),
+        rotation=packed(rotation),
+        held=packed(np.einsum("lij,lj->li", stiffness, rotation)),
+        carried=packed(mass * rotation),
         profile=profile,
         profile_first=profile_first,
         cells_per_second=cells_per_second,
@@ -164,19 +200,46 @@ def at_step(group: GroupT, before: float, after: float) -> GroupT:
     return group._replace(numbers=numbers.ravel())
 
 
-def mesh_numbers(dynamics: PairDynamics, step: float, rest: Array) -> tuple[float, ...]:
-    """The mesh as numbers, in the order of the rows of ``_layout.Group.numbers``.
+def pair_numbers(dynamics: PairDynamics, step: float, rest: Array) -> tuple[float, ...]:
+    """The mesh of a pair as numbers, see ``mesh_numbers``.
 
     Parameters
     ----------
     step : s    of the integration
     rest : (dof,)    the equilibrium from which the state is counted
     """
-    table, options, pair = dynamics.table, dynamics.table.options, dynamics.table.pair
-    lag, damping = half_lag(table), dynamics.mesh_damping
-    if options.law == "one_sided":
+    damping = dynamics.mesh_damping
+    if dynamics.table.options.law == "one_sided":
         damping = damping / dynamics.mesh_force
-    speed = pair.pinion.base_radius * dynamics.operating.speed
+    speed = dynamics.table.pair.pinion.base_radius * dynamics.operating.speed
+    return mesh_numbers(
+        dynamics.teeth,
+        damping=damping,
+        mean_force=dynamics.mesh_force,
+        rest_approach=float(dynamics.approach_direction() @ rest),
+        per_switch_width=2.0 / (speed * step),
+    )
+
+
+def mesh_numbers(
+    teeth: MeshTeeth,
+    *,
+    damping: float,
+    mean_force: float,
+    rest_approach: float,
+    per_switch_width: float = 0.0,
+) -> tuple[float, ...]:
+    """The mesh as numbers, in the order of the rows of ``_layout.Group.numbers``.
+
+    Parameters
+    ----------
+    damping : N s/m, of the one-sided law per N of the force of a pair of teeth
+    mean_force : N, that the forces of the group leave out
+    rest_approach : m, at the equilibrium from which the state is counted
+    per_switch_width : 1/m, of the paper's law
+    """
+    table, options, pair = teeth.table, teeth.table.options, teeth.pair
+    lag = half_lag(table)
     return (
         pair.pinion.base_radius,
         pair.wheel.base_radius,
@@ -188,65 +251,62 @@ def mesh_numbers(dynamics: PairDynamics, step: float, rest: Array) -> tuple[floa
         damping,
         options.friction_coefficient,
         2.0 / (options.friction_transition * pair.base_pitch + 2.0 * lag),
-        2.0 / (speed * step),
+        per_switch_width,
         pair.backlash,
-        dynamics.mesh_force,
-        float(dynamics.approach_direction() @ rest),
+        mean_force,
+        rest_approach,
         lag,
         pair.pitch_point + lag,
     )
 
 
-def exact_numbers(dynamics: PairDynamics) -> tuple[float, ...]:
+def _exact_numbers(teeth: MeshTeeth) -> tuple[float, ...]:
     """Numbers that locate the pairs, in the order of the rows of ``_layout.Group.exact``."""
-    options, pair = dynamics.table.options, dynamics.table.pair
+    options, pair = teeth.table.options, teeth.pair
     near = -math.inf, math.inf
     if options.law == "one_sided":
-        near = near_positions(dynamics)
+        near = near_positions(teeth)
     return (
         pair.pinion.base_radius,
         pair.base_pitch,
         1.0 / pair.base_pitch,
         options.points_per_pitch / pair.base_pitch,
-        dynamics.start_roll,
+        teeth.start_roll,
         *near,
-        pitches(dynamics.table)[0] * pair.base_pitch,
+        pitches(teeth.table)[0] * pair.base_pitch,
     )
 
 
-def near_positions(dynamics: PairDynamics) -> tuple[float, float]:
+def near_positions(teeth: MeshTeeth) -> tuple[float, float]:
     """Positions s outside of which no pair comes within ``FAR_NEAR`` of touching, m."""
-    position = dynamics.table.position
-    near = np.flatnonzero(nearest_gaps(dynamics) < FAR_NEAR)
+    position = teeth.table.position
+    near = np.flatnonzero(nearest_gaps(teeth) < FAR_NEAR)
     first, last = 0, len(position) - 1
     if len(near) > 0:  # else every pair may be as near as any other
         first, last = max(near[0] - 1, first), min(near[-1] + 1, last)
     return float(position[first]), float(position[last])
 
 
-def nearest_gaps(dynamics: PairDynamics) -> Array:
+def nearest_gaps(teeth: MeshTeeth) -> Array:
     """No less than these are the gaps of any pair of teeth, with their errors, (node,) m."""
-    table = dynamics.table
+    table = teeth.table
     beyond = table.position - table.pair.pitch_point - half_lag(table)
-    teeth = (
-        (dynamics.pinion_error, dynamics.pinion_tilt),
-        (dynamics.wheel_error, dynamics.wheel_tilt),
-    )
+    gears = zip(least_gaps(table), teeth.errors, teeth.tilts, strict=True)
     nearest = [
         flank + error.min() + np.minimum(tilt.min() * beyond, tilt.max() * beyond)
-        for flank, (error, tilt) in zip(least_gaps(table), teeth, strict=True)
+        for flank, error, tilt in gears
     ]
     return np.asarray(nearest[0] + nearest[1])
 
 
-def mesh_indices(
-    lanes: Sequence[PairDynamics], teeth: Sequence[ToothRows]
+def _mesh_indices(
+    meshes: Sequence[MeshTeeth], teeth: Sequence[ToothRows]
 ) -> NDArray[np.int64]:
     """Indices of every lane into the tables, (lane, row of ``Group.indices``)."""
     indices = []
     first_tooth, first_value = 0, 0
-    for machine, rows in zip(lanes, teeth, strict=True):
-        table, pair = machine.table, machine.table.pair
+    for mesh, rows in zip(meshes, teeth, strict=True):
+        table, pair = mesh.table, mesh.pair
         _, n_chords, n_nodes, _ = rows.values.shape
         first_pitch, last_pitch = pitches(table)
         per_chord = n_nodes * COLUMNS
@@ -257,8 +317,7 @@ def mesh_indices(
             (
                 pair.pinion.n_teeth,
                 pair.wheel.n_teeth,
-                machine.start_tooth_pinion,
-                machine.start_tooth_wheel,
+                *mesh.start_teeth,
                 first_tooth,
                 first_tooth + pair.pinion.n_teeth,
                 first_value,
@@ -277,6 +336,16 @@ def mesh_indices(
     return np.array(indices, dtype=np.int64)
 
 
+def profile_cells(span: tuple[float, float]) -> tuple[int, Array]:
+    """Number of the first cell of a profile over a span in s, and edges of all, (cell + 1,) s.
+
+    Cells begin at multiples of their length, so that an instant has the same bits in any span.
+    """
+    first = math.floor(span[0] * CELLS_PER_SECOND)
+    last = max(math.ceil(span[1] * CELLS_PER_SECOND), first + 1)
+    return first, np.arange(first, last + 1) / CELLS_PER_SECOND
+
+
 def _profile(
     lanes: Sequence[PairDynamics], span: tuple[float, float]
 ) -> tuple[Array, int, float]:
@@ -292,11 +361,8 @@ def _profile(
         ]
         profile[0, layout.TORQUE] = 1.0
         return profile.ravel(), 0, 1.0
-    # cells begin at multiples of their length, so that an instant has the same bits in any span
-    first = math.floor(span[0] * CELLS_PER_SECOND)
-    last = max(math.ceil(span[1] * CELLS_PER_SECOND), first + 1)
-    edges = np.arange(first, last + 1) / CELLS_PER_SECOND
-    profile = np.empty((last - first, layout.N_PROFILE, len(lanes)))
+    first, edges = profile_cells(span)
+    profile = np.empty((len(edges) - 1, layout.N_PROFILE, len(lanes)))
     for lane, machine in enumerate(lanes):
         nominal = machine.nominal(edges)
         speed, torque = nominal.speed, nominal.torque_factor
@@ -312,10 +378,10 @@ def _profile(
     return profile.ravel(), first, CELLS_PER_SECOND
 
 
-def chord_depths(lanes: Sequence[PairDynamics]) -> Array:
+def _chord_depths(meshes: Sequence[MeshTeeth]) -> Array:
     """Penetrations from which chords hold, (lane, chord) m, infinite for absent chords."""
-    depths = [getattr(machine.table, "depth", np.zeros(1)) for machine in lanes]
-    filled = np.full((len(lanes), max(len(depth) for depth in depths)), np.inf)
+    depths = [getattr(mesh.table, "depth", np.zeros(1)) for mesh in meshes]
+    filled = np.full((len(meshes), max(len(depth) for depth in depths)), np.inf)
     for row, depth in zip(filled, depths, strict=True):
         row[: len(depth)] = depth
     return filled

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gensig.dynamics._layout import N_SEEN, SEEN_FORCE, SEEN_NEWEST, SEEN_PAIRS
 from gensig.dynamics.helical import half_lag, pitches
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.mesh_teeth import MeshTeeth
 
 Array = NDArray[np.float64]
 
@@ -52,12 +52,12 @@ class MeshState:
 
 
 def mesh_state(
-    dynamics: PairDynamics,
+    teeth: MeshTeeth,
     seen: Array,
     angle: Array,
     faulty: Collection[tuple[str, int]] = (),
 ) -> MeshState:
-    """Mesh state of one machine, from the rows of the compiled core.
+    """State of one mesh, from the rows of the compiled core.
 
     Parameters
     ----------
@@ -65,19 +65,19 @@ def mesh_state(
     angle : (sample,) rad   of the pinion since time 0
     faulty : teeth that are not sound, by (gear, tooth)
     """
-    pair = dynamics.table.pair
+    pair = teeth.pair
     assert len(seen) == N_SEEN
-    first_pitch, last_pitch = pitches(dynamics.table)
+    first_pitch, last_pitch = pitches(teeth.table)
     n_pairs = last_pitch - first_pitch
     index = seen[SEEN_NEWEST].astype(np.int64) - np.arange(n_pairs)[:, None]
-    roll = dynamics.start_roll + pair.pinion.base_radius * angle
+    roll = teeth.start_roll + pair.pinion.base_radius * angle
     position = roll - index * pair.base_pitch
     force, forces = seen[SEEN_FORCE], seen[SEEN_PAIRS : SEEN_PAIRS + n_pairs]
     total = forces.sum(axis=0)
     share = np.divide(forces, total, out=np.zeros_like(forces), where=total > 0.0)
-    pinion = (index + dynamics.start_tooth_pinion) % pair.pinion.n_teeth
-    wheel = (index + dynamics.start_tooth_wheel) % pair.wheel.n_teeth
-    path_end = pair.path_of_contact + 2.0 * half_lag(dynamics.table)
+    pinion = (index + teeth.start_teeth[0]) % pair.pinion.n_teeth
+    wheel = (index + teeth.start_teeth[1]) % pair.wheel.n_teeth
+    path_end = pair.path_of_contact + 2.0 * half_lag(teeth.table)
     loaded = forces > 0.0
     near = loaded | ((position >= 0.0) & (position <= path_end))
     odd = np.zeros(near.shape, dtype=bool)

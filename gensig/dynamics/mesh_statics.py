@@ -29,10 +29,6 @@ from gensig.mesh.sliced.sliced_table import SlicedTable
 Array = NDArray[np.float64]
 
 PER_PITCH = 32  # phases of a base pitch over which the stiffness is averaged
-# over a turn of the wheel, at which static loads give the mean friction: a prime, so that the rolls
-# sample each tooth at other positions than the last. Another number changes the level of a record
-# by up to 0.3 %, and no longer makes the frozen benchmark
-FRICTION_POSITIONS = 509
 
 
 def tooth_states(
@@ -56,22 +52,6 @@ def static_load(
         return chord_equilibrium(table, states, force)
     assert isinstance(states, PairStates)
     return static_mesh(table, states, force)
-
-
-def mean_friction_torque(
-    table: PairTable | SlicedTable, force: float, **teeth: Any
-) -> float:
-    """Mean friction torque under a normal force in N, reduced to the pinion, N m.
-
-    From the static loads over one turn of the wheel; ``teeth`` as in ``tooth_states``.
-    """
-    pair = table.pair
-    shares = (np.arange(FRICTION_POSITIONS) + 0.5) / FRICTION_POSITIONS
-    roll = pair.base_pitch * pair.wheel.n_teeth * shares
-    states = tooth_states(table, roll, **teeth)
-    load = static_load(table, states, force).load
-    lost = (load * loss_arm(table, states.position)).sum(axis=1)
-    return table.options.friction_coefficient * float(np.mean(lost))
 
 
 def loss_arm(table: PairTable | SlicedTable, position: Array) -> Array:

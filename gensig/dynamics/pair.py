@@ -8,23 +8,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.helical import AXIAL_DOFS, axial_reach, pitches
-from gensig.dynamics.mesh_statics import (
-    mean_friction_torque,
-    mean_mesh_stiffness,
-    static_load,
-    tooth_states,
-)
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.system import LumpedSystem, eigenvalues
 from gensig.errors import ConfigError
-from gensig.mesh.load_distribution import PairStates, StaticMesh
 from gensig.mesh.pair_table import PairTable
-from gensig.mesh.sliced.sliced_statics import ChordStates
 from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.operation.setpoint import Nominal, Operating
 from gensig.units import split_unit, unit
@@ -42,15 +34,6 @@ PAIR_DOFS = (
 # all that a machine may have; ``PairDynamics.dofs`` lists its own
 DOFS = (*PAIR_DOFS, *AXIAL_DOFS, "motor_rotation", "load_rotation")
 APPROACH_SIGN = (0.0, -1.0, 1.0, 0.0, 1.0, -1.0)
-# fields of the teeth that meet, and arguments of the statics
-TOOTH_FIELDS = (
-    "start_tooth_pinion",
-    "start_tooth_wheel",
-    "pinion_error",
-    "wheel_error",
-    "pinion_tilt",
-    "wheel_tilt",
-)
 # indices in PAIR_DOFS
 PINION_X, PINION_Y, PINION_ROTATION, WHEEL_X, WHEEL_Y, WHEEL_ROTATION = range(6)
 PINION_Z, WHEEL_Z = 6, 9  # of helical gears, each followed by its tilts
@@ -151,22 +134,13 @@ def solid_disc(
 class PairDynamics:
     """All parameters of the motion of one gear pair.
 
-    No slots: the equations are cached. ``pinion_error``, ``wheel_error`` (tooth,) m open the gaps
-    of their teeth at the pitch point; ``pinion_tilt``, ``wheel_tilt`` (tooth,) m/m is the growth
-    of these gaps along the path.
+    No slots: the equations are cached.
     """
 
-    table: PairTable | SlicedTable
+    teeth: MeshTeeth
     pinion: Body
     wheel: Body
     operating: Operating
-    pinion_error: Array
-    wheel_error: Array
-    pinion_tilt: Array
-    wheel_tilt: Array
-    start_tooth_pinion: int
-    start_tooth_wheel: int
-    start_phase: float
     motor: Rotor | None = None
     load: Rotor | None = None
 
@@ -182,6 +156,11 @@ class PairDynamics:
                     f"{axial:g}, stiffness_tilt_nm_per_rad = {tilt:g} and the inertia of "
                     f"tilting {body.tilt_inertia:g} kg m2 to be positive"
                 )
+
+    @property
+    def table(self) -> PairTable | SlicedTable:
+        """Tables of the teeth."""
+        return self.teeth.table
 
     @property
     def is_helical(self) -> bool:
@@ -225,11 +204,6 @@ class PairDynamics:
     def mesh_force(self) -> float:
         """Mean normal force of the set torque, N."""
         return self.operating.torque / self.table.pair.pinion.base_radius
-
-    @property
-    def start_roll(self) -> float:
-        """Roll along the line of action at time 0, the first recorded sample, m."""
-        return self.start_phase * self.table.pair.base_pitch
 
     @property
     def mesh_frequency(self) -> float:
@@ -331,7 +305,7 @@ class PairDynamics:
     @cached_property
     def mean_mesh_stiffness(self) -> float:
         """Mean tangent stiffness of healthy teeth over one base pitch under the set torque, N/m."""
-        return mean_mesh_stiffness(self.table, self.mesh_force)
+        return self.teeth.mean_stiffness(self.mesh_force)
 
     @property
     def mesh_damping(self) -> float:
@@ -346,11 +320,8 @@ class PairDynamics:
         return eigenvalues(self.system(), self.approach_direction(), stiffness)
 
     def friction_torque(self) -> float:
-        """Mean friction torque reduced to the pinion, N m.
-
-        From the static loads over one turn of the wheel.
-        """
-        return mean_friction_torque(self.table, self.mesh_force, **self._teeth)
+        """Mean friction torque reduced to the pinion, N m."""
+        return self.teeth.friction_torque(self.mesh_force)
 
     def rest(self) -> Array:
         """Deflections of supports and couplings about which the machine moves, (dof,).
@@ -359,6 +330,11 @@ class PairDynamics:
         """
         start = self.static_start(0.0)
         return np.asarray(start - self.system().rotation * start[PINION_ROTATION])
+
+    def start(self, time: float) -> tuple[Array, Array]:
+        """As ``Dynamics.start``: at rest."""
+        deflection = self.static_start(time)
+        return deflection, np.zeros(len(deflection))
 
     def static_start(self, time: float) -> Array:
         """Equilibrium at a nominal time: deflected supports and couplings, approach, (dof,).
@@ -383,8 +359,8 @@ class PairDynamics:
             start[PINION_ROTATION] -= torque / self.motor.coupling_stiffness
         advance = radius * start[PINION_ROTATION]
         elapsed = float(self.operating.time_at_set_speed(times)[0])
-        roll = self.start_roll + radius * self.operating.speed * elapsed + advance
-        static = self.static(self.states(np.array([roll])), force)
+        roll = self.teeth.start_roll + radius * self.operating.speed * elapsed + advance
+        static = self.teeth.static(self.teeth.states(np.array([roll])), force)
         approach = float(static.approach[0])
         if not math.isfinite(approach):
             approach = 0.0
@@ -403,18 +379,6 @@ class PairDynamics:
             twist = torque / self.load.coupling_stiffness
             start[driven] = start[WHEEL_ROTATION] + twist
         return start
-
-    def states(self, roll: Array) -> PairStates | ChordStates:
-        """Pairs of teeth at rolls of the pinion in m, (phase,)."""
-        return tooth_states(self.table, roll, **self._teeth)
-
-    def static(self, states: PairStates | ChordStates, force: float) -> StaticMesh:
-        """Equilibrium of pairs of teeth under a normal force in N."""
-        return static_load(self.table, states, force)
-
-    @property
-    def _teeth(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in TOOTH_FIELDS}
 
 
 def _couple(matrix: Array, first: int, second: int, value: float) -> None:

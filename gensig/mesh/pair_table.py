@@ -420,13 +420,3 @@ def distinct_teeth(
 def _structure_key(tooth: Tooth) -> tuple[int, ...]:
     """Key of a tooth's structure: teeth whose sections are the same objects bend alike."""
     return id(tooth.material_loss), id(tooth.slice_edges), id(tooth.cracks)
-
-
-def pair_compliance(
-    table: PairTable, position: Array, pinion_kind: int = 0, wheel_kind: int = 0
-) -> Array:
-    """Compliance of a single tooth pair under the table's load, (phase,) m/N."""
-    pinion = table.pinion.compliance[pinion_kind]
-    wheel = table.wheel.compliance[wheel_kind]
-    nodes = table.position
-    return np.interp(position, nodes, pinion) + np.interp(position, nodes, wheel)

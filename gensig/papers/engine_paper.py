@@ -76,9 +76,7 @@ def _motion(words: tuple[str, ...]) -> TimeResponse:
         line,
         point.speed,
         point.torque,
-        tabulated=tabulated_meshes(
-            line, read_tooth_law(config), point.speed, point.torque
-        ),
+        teeth=tabulated_meshes(line, read_tooth_law(config), point.speed, point.torque),
         nodes=tuple(NODES.values()),
         duration=DURATION,
     )

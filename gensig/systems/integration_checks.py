@@ -18,6 +18,7 @@ from gensig.dynamics.integrator import (
     check_machine,
 )
 from gensig.dynamics.lanes import nearest_gaps
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.pair import PairDynamics
 from gensig.errors import SimulationError, StepError
 from gensig.sensing.agreement import agreement
@@ -91,7 +92,7 @@ def finer(run: Run[MachineT]) -> Run[MachineT]:
     return replace(run, system=replace(run.system, solver=better))
 
 
-def not_finite(run: Run[MachineT], meshes: Sequence[PairDynamics]) -> StepError:
+def not_finite(run: Run[MachineT], meshes: Sequence[MeshTeeth]) -> StepError:
     """The error of a motion that left all bounds: what may have driven it there, and a remedy."""
     operating, solver = run.system.operating, run.system.solver
     speed_rpm = from_si("speed_rpm", operating.speed)
@@ -106,7 +107,7 @@ def not_finite(run: Run[MachineT], meshes: Sequence[PairDynamics]) -> StepError:
     if run.system.mesh.law != "one_sided":
         return StepError(f"{failed}; {remedy}")
     for mesh in meshes:
-        backlash_um = from_si("backlash_um", mesh.table.pair.backlash)
+        backlash_um = from_si("backlash_um", mesh.pair.backlash)
         overlap_um = -from_si("gap_um", float(nearest_gaps(mesh).min()))
         if overlap_um > backlash_um:
             return StepError(

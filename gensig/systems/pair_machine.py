@@ -17,6 +17,7 @@ from gensig.dynamics.integrator import (
     integrate,
 )
 from gensig.dynamics.mesh_state import mesh_state
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.pair import Body, PairDynamics, Rotor
 from gensig.dynamics.response import LinearPair
 from gensig.errors import FaultError, SimulationError
@@ -210,17 +211,19 @@ def pair_dynamics(run: PairRun) -> PairDynamics:
     specimen = run.specimen or perfect_specimen(pair.pinion, pair.wheel)
     gearbox = run.gearbox or nominal_gearbox(len(machine.sensing.channels))
     return PairDynamics(
-        table=specimen_table(machine, run.faults, specimen),
+        teeth=MeshTeeth(
+            table=specimen_table(machine, run.faults, specimen),
+            errors=(specimen.pinion_error, specimen.wheel_error),
+            tilts=(
+                specimen.pinion_tilt + np.zeros(pair.pinion.n_teeth),
+                specimen.wheel_tilt + np.zeros(pair.wheel.n_teeth),
+            ),
+            start_teeth=(start.tooth_pinion, start.tooth_wheel),
+            start_phase=start.phase,
+        ),
         pinion=in_gearbox(machine.pinion, gearbox, slice(0, 2), machine.quality),
         wheel=in_gearbox(machine.wheel, gearbox, slice(2, 4), machine.quality),
         operating=machine.operating,
-        pinion_error=specimen.pinion_error,
-        wheel_error=specimen.wheel_error,
-        pinion_tilt=specimen.pinion_tilt + np.zeros(pair.pinion.n_teeth),
-        wheel_tilt=specimen.wheel_tilt + np.zeros(pair.wheel.n_teeth),
-        start_tooth_pinion=start.tooth_pinion,
-        start_tooth_wheel=start.tooth_wheel,
-        start_phase=start.phase,
         motor=machine.motor,
         load=machine.load,
     )
@@ -291,7 +294,7 @@ def _side_by_side(
     records: list[CleanRecord | SimulationError] = []
     for index, run in enumerate(runs):
         if not motions.finite[index]:
-            records.append(not_finite(run, [machines[index]]))
+            records.append(not_finite(run, [machines[index].teeth]))
             continue
         acceleration, angle = motions.acceleration[index], motions.angle[index][0]
         if run.gearbox is not None:
@@ -299,7 +302,7 @@ def _side_by_side(
         mesh = None
         if run.with_mesh_state:
             faulty = faulty_teeth(run.system.pair, run.faults)
-            mesh = mesh_state(machines[index], motions.seen[index], angle, faulty)
+            mesh = mesh_state(machines[index].teeth, motions.seen[index], angle, faulty)
         records.append(
             CleanRecord(
                 acceleration=acceleration,

@@ -20,7 +20,6 @@ from numpy.testing import assert_allclose
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import FAULTS
 from gensig.geometry.tooth import healthy_tooth
-from gensig.mesh.pair_table import pair_compliance
 from gensig.mesh.tooth_sections import sections
 
 
@@ -174,9 +173,16 @@ class TestThePapersCrack:
 
 def lost_at_pitch_point(system, fault):
     """Share of the single pair's stiffness at C that a fault costs, gaps left out."""
-    at = np.array([system.pair.pitch_point])
-    faulty = pair_compliance(system.mesh_table((fault,)), at, pinion_kind=1)
-    return (1 - pair_compliance(system.mesh_table(), at) / faulty).item()
+
+    def compliance(table, kind):
+        gears = (table.pinion.compliance[kind], table.wheel.compliance[0])
+        return sum(
+            np.interp(system.pair.pitch_point, table.position, of_gear)
+            for of_gear in gears
+        )
+
+    faulty = compliance(system.mesh_table((fault,)), 1)
+    return 1 - compliance(system.mesh_table(), 0) / faulty
 
 
 class TestThePapersPit:

@@ -81,7 +81,7 @@ def velocities_of_the_core(dynamics, step, oversampling, n_samples):
         fill_lanes([dynamics], "float64"), NO_CHANNELS, "float64", THREE_PAIRS
     )
     for lane in range(run.n_lanes):
-        run.begin(group, lane, dynamics.static_start(0.0))
+        run.begin(group, lane, *dynamics.start(0.0))
     velocities = [run.state[1, :, 0].copy()]
     for sample in range(n_samples):
         run.advance(group, step, sample * oversampling, oversampling)

@@ -43,9 +43,9 @@ def simulate_time(
             f"--time {duration:g}: give seconds above 0, at most {LONGEST_TIME:g}"
         )
     speed, torque = torques.speed, torques.brake_torque
-    tabulated = tabulated_meshes(line, law, speed, torque)
+    teeth = tabulated_meshes(line, law, speed, torque)
     return time_response(
-        line, speed, torque, tabulated=tabulated, nodes=nodes, duration=duration
+        line, speed, torque, teeth=teeth, nodes=nodes, duration=duration
     )
 
 
@@ -66,14 +66,14 @@ def simulate_sweep(
             f"--sweep {text}: give low and high speed in r/min "
             f"and the seconds from one to the other, at most {LONGEST_TIME:g}"
         )
-    tabulated = tabulated_meshes(line, law, 0.5 * (low + high), torque)
+    teeth = tabulated_meshes(line, law, 0.5 * (low + high), torque)
     return sweep_response(
         line,
         low,
         high,
         seconds,
         torque,
-        tabulated=tabulated,
+        teeth=teeth,
         nodes=nodes,
         n_orders=n_orders,
     )

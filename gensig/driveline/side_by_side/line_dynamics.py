@@ -11,21 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.driveline.running import RunningLine
-from gensig.driveline.side_by_side.line_pairs import mesh_pair
 from gensig.driveline.side_by_side.line_statics import line_at_rest
+from gensig.driveline.time.course import ShaftTorque
 from gensig.driveline.time.mesh_friction import slide_direction
 from gensig.dynamics.backends.nystroem.method import is_followed_by_three
 from gensig.dynamics.backends.nystroem.stability import stable_rate
 from gensig.dynamics.backends.step_limits import LONGEST_SETTLING, SETTLED
 from gensig.dynamics.integrator import Solver
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.errors import SimulationError, StepError
-from gensig.operation.setpoint import Operating
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-OTHER_BACKEND = "take solver.backend=newmark"
 STIFFER = 1.2  # than their mean stiffness are meshes taken for the longest step
 
 
@@ -38,7 +36,7 @@ class LineDynamics:
     Parameters
     ----------
     running : the line with its course, torques and mean mesh forces
-    pairs : the teeth of every mesh with their law; their supports are not read
+    teeth : the teeth of every mesh
     touched : (mesh, 6) degrees of freedom of x, y and rotation of gear a and of gear b, -1 for a
         gear that does not move so
     senses : (mesh,) 1 where gear a turns from x to y, else -1
@@ -46,7 +44,7 @@ class LineDynamics:
     """
 
     running: RunningLine
-    pairs: tuple[PairDynamics, ...]
+    teeth: tuple[MeshTeeth, ...]
     touched: Index
     senses: Array
     angles: tuple[int, ...]
@@ -54,7 +52,7 @@ class LineDynamics:
     @property
     def has_chords(self) -> bool:
         """True if a mesh is helical or has more than three pairs of teeth in contact."""
-        return not all(is_followed_by_three(pair) for pair in self.pairs)
+        return not all(is_followed_by_three(teeth) for teeth in self.teeth)
 
     @property
     def dofs(self) -> tuple[str, ...]:
@@ -84,6 +82,13 @@ class LineDynamics:
         return slide
 
     @cached_property
+    def mesh_stiffness(self) -> Array:
+        """Mean stiffness of every mesh under its reference force, (mesh,) N/m."""
+        forces = self.running.reference_force
+        meshes = zip(self.teeth, forces.tolist(), strict=True)
+        return np.array([teeth.mean_stiffness(force) for teeth, force in meshes])
+
+    @cached_property
     def stiff_rates(self) -> NDArray[np.complex128]:
         """Eigenvalues with the meshes held at 1.2 times their mean stiffness, 1/s."""
         return self._rates(STIFFER)
@@ -98,9 +103,9 @@ class LineDynamics:
     def _rates(self, stiffer: float) -> NDArray[np.complex128]:
         line = self.running.line
         stiffness, n = line.stiffness.copy(), len(line.names)
-        for mesh, pair in zip(line.meshes, self.pairs, strict=True):
-            held = stiffer * pair.mean_mesh_stiffness
-            stiffness += held * np.outer(mesh.direction, mesh.direction)
+        for mesh, held in zip(line.meshes, self.mesh_stiffness, strict=True):
+            along = np.outer(mesh.direction, mesh.direction)
+            stiffness += stiffer * held * along
         per_mass = 1.0 / np.diag(line.mass)[:, None]
         state = np.block(
             [
@@ -121,52 +126,79 @@ class LineDynamics:
         """Degree of freedom that turns with the reference."""
         return int(np.argmin(np.abs(self.running.line.rotation - 1.0)))
 
+    def start(self, time: float) -> tuple[Array, Array]:
+        """As ``Dynamics.start``; of a line with sources the linear vibration is on it.
+
+        That vibration is the answer to the sources if no mesh parts.
+        """
+        still = self.static_start(time)
+        if not self.sources:
+            return still, np.zeros(len(still))
+        running = self.running
+        angle, speed = running.course.nominal(np.array([time]))
+        orders, phasors = running.linear.orders, running.linear.angle
+        turned = np.exp(1j * orders * (running.turned + float(angle[0])))
+        rates = 1j * orders * float(speed[0]) * phasors
+        return still + np.real(phasors @ turned), np.real(rates @ turned)
+
     def static_start(self, time: float) -> Array:
         """Deflection under the mean torques at a nominal time, without friction, (dof,).
 
         Under a nominal acceleration it is that of the accelerated line.
         """
         line, course = self.running.line, self.running.course
-        angle = float(course.nominal(np.array([time]))[0][0])
-        force = self._torques(np.array([time]))[0]
+        times = np.array([time])
+        angle = float(course.nominal(times)[0][0])
+        force = self._torques(self.running.torques, times)[0]
         force -= line.mass @ line.rotation * course.acceleration(time)
-        return line_at_rest(line, self.pairs, angle, force)
+        mean = self.running.reference_force
+        return line_at_rest(line, self.teeth, mean, self.mesh_stiffness, angle, force)
+
+    @property
+    def sources(self) -> tuple[ShaftTorque, ...]:
+        """Torques that follow the angle of their degree of freedom."""
+        return tuple(t for t in self.running.torques if len(t.table) > 1)
+
+    def sense(self, torque: ShaftTorque) -> float:
+        """1 where the angle that a torque acts on counts as it nominally rotates, else -1."""
+        return math.copysign(1.0, float(self.running.line.rotation[torque.dof]))
+
+    def factors(self, times: Array) -> Array:
+        """Factors of the sources at times in s, (time, source)."""
+        factors = [self._factor(source, times) for source in self.sources]
+        return np.array(factors).reshape(-1, len(times)).T
 
     def forces(self, times: Array) -> Array:
-        """Torques and forces on the degrees of freedom at times in s, (time, dof)."""
-        forces = self._torques(times)
+        """Torques and forces that follow no angle, on the degrees of freedom, (time, dof)."""
+        steady = [t for t in self.running.torques if len(t.table) == 1]
+        forces = self._torques(steady, times)
         if self.running.line.friction_torque is not None:
             forces += self.running.line.friction_torque
         return forces
 
-    def _torques(self, times: Array) -> Array:
-        """The same without what makes up for friction."""
+    def _torques(self, torques: Sequence[ShaftTorque], times: Array) -> Array:
+        """Means of torques over their angle at times in s, (time, dof)."""
         forces = np.zeros((len(times), len(self.dofs)))
-        for torque in self.running.torques:
-            factor: Array | float = 1.0
-            if torque.factor is not None:
-                factor = np.interp(times, self.running.course.time, torque.factor)
-            forces[:, torque.dof] += float(torque.table.mean()) * factor
+        for torque in torques:
+            mean = self.sense(torque) * float(torque.table.mean())
+            forces[:, torque.dof] += mean * self._factor(torque, times)
         return forces
 
+    def _factor(self, torque: ShaftTorque, times: Array) -> Array:
+        if torque.factor is None:
+            return np.ones(len(times))
+        return np.interp(times, self.running.course.time, torque.factor)
 
-def line_dynamics(
-    running: RunningLine,
-    operating: Operating,
-    *,
-    angles: Sequence[int],
-) -> LineDynamics:
-    """The motion of a line whose meshes all have tables of teeth.
 
-    Parameters
-    ----------
-    operating : options of the set-point; its speed and torque are not read
-    angles : numbers of the nodes whose angles are given out
+def line_dynamics(running: RunningLine, *, angles: Sequence[int]) -> LineDynamics:
+    """The motion of a line whose meshes all have teeth.
+
+    ``angles`` are numbers of the nodes whose angles are given out.
     """
     meshes = range(len(running.line.meshes))
     return LineDynamics(
         running=running,
-        pairs=tuple(_toothed_pair(running, m, operating) for m in meshes),
+        teeth=tuple(_teeth(running, m) for m in meshes),
         touched=np.array([running.touched(m) for m in meshes], dtype=np.int64),
         senses=np.array([running.sense(m) for m in meshes]),
         angles=tuple(running.dof(node) for node in angles),
@@ -174,15 +206,7 @@ def line_dynamics(
 
 
 def check_line(line: LineDynamics, solver: Solver, sampling_rate: float) -> None:
-    """Raise SimulationError for an unstable step or a line that the core does not cover."""
-    for pair in line.pairs:
-        _refuse(pair)
-    for torque in line.running.torques:
-        if len(torque.table) > 1:
-            raise SimulationError(
-                f"solver.backend = nystroem takes torques that do not follow an angle, but that "
-                f"on '{line.dofs[torque.dof]}' does; {OTHER_BACKEND}"
-            )
+    """Raise StepError for an unstable step."""
     needed = math.ceil(stable_rate(line.stiff_rates) / sampling_rate)
     if needed > solver.oversampling:
         raise StepError(
@@ -191,20 +215,10 @@ def check_line(line: LineDynamics, solver: Solver, sampling_rate: float) -> None
         )
 
 
-def _refuse(pair: PairDynamics) -> None:
-    """Raise SimulationError for a mesh that the core of lines does not cover."""
-    law = pair.table.options.law
-    if law != "one_sided":
-        raise SimulationError(
-            f"mesh.law = {law} is not covered by solver.backend = nystroem on a drive line; "
-            f"{OTHER_BACKEND}"
-        )
-
-
-def _toothed_pair(running: RunningLine, m: int, operating: Operating) -> PairDynamics:
-    if m not in running.tabulated:
+def _teeth(running: RunningLine, m: int) -> MeshTeeth:
+    if m not in running.teeth:
         raise SimulationError(
             "solver.backend = nystroem takes meshes of tabulated teeth, but mesh "
-            f"{running.line.meshes[m].name} has none; {OTHER_BACKEND}"
+            f"{running.line.meshes[m].name} has none; take solver.backend=newmark"
         )
-    return mesh_pair(running, m, operating)
+    return running.teeth[m]

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 def line_core(line: LineDynamics) -> Core[LineDynamics]:
     """The core for lines of the bodies and meshes of one."""
     meshes = _line_chord_meshes if line.has_chords else _line_spur_meshes
-    n_meshes = len(line.pairs)
+    n_meshes = len(line.teeth)
     return Core(
         pack=pack_lines,
         scratch=partial(_scratch, n_meshes),

@@ -15,7 +15,7 @@ from gensig.driveline.side_by_side.line_dynamics import (
     line_dynamics,
 )
 from gensig.driveline.side_by_side.line_integration import integrate_lines
-from gensig.driveline.side_by_side.line_pairs import line_mesh_state
+from gensig.driveline.side_by_side.line_mesh_states import line_mesh_state
 from gensig.dynamics.backends.base import N_SEEN, Integration, Motions
 from gensig.dynamics.backends.nystroem._line_layout import A_TURN
 from gensig.dynamics.mesh_state import MeshState
@@ -84,11 +84,7 @@ def dynamics_of(run: LineRun) -> LineDynamics:
     if run.with_mesh_state:
         nodes = [line.gears[mesh.driving].node for mesh in line.meshes]
         turned += [engine.drive.numbers[node] for node in nodes]
-    return line_dynamics(
-        machine.line(run),
-        machine.operating,
-        angles=turned,
-    )
+    return line_dynamics(machine.line(run), angles=turned)
 
 
 def _rate(run: LineRun) -> float:
@@ -111,6 +107,7 @@ def _kind(run: LineRun, line: LineDynamics) -> tuple[object, ...]:
         line.touched.tobytes(),
         line.has_chords,
         line.angles,
+        tuple(source.dof for source in line.sources),
     )
 
 
@@ -136,7 +133,7 @@ def _together(
     records: list[CleanRecord | SimulationError] = []
     for index, (run, line) in enumerate(zip(runs, machines, strict=True)):
         if not motions.finite[index]:
-            records.append(not_finite(run, line.pairs))
+            records.append(not_finite(run, line.teeth))
             continue
         signals = _signals(line, motions, index, dofs, rate)
         number, mesh = run.system.mesh_number, None
@@ -164,10 +161,10 @@ def _mesh_states(
 ) -> list[MeshState]:
     """Loads of the teeth of all meshes in one of some motions."""
     states = []
-    for m, pair in enumerate(line.pairs):
+    for m, teeth in enumerate(line.teeth):
         seen = motions.seen[index][m * N_SEEN : (m + 1) * N_SEEN]
         angle = motions.angle[index][line.angles.index(line.touched[m, A_TURN])]
-        states.append(line_mesh_state(run, pair, m, seen, angle))
+        states.append(line_mesh_state(run, teeth, m, seen, angle))
     return states
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.driveline.time.geared_line import GearedLine
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.mesh_teeth import MeshTeeth
 
 Array = NDArray[np.float64]
 
@@ -19,11 +19,17 @@ FREE = 1e-12  # share of the springs that hold a line which turns freely
 
 
 def line_at_rest(
-    line: GearedLine, pairs: Sequence[PairDynamics], angle: float, force: Array
+    line: GearedLine,
+    teeth: Sequence[MeshTeeth],
+    mean: Array,
+    scale: Array,
+    angle: float,
+    force: Array,
 ) -> Array:
     """Deflection under forces (dof,) at a nominal angle of the reference in rad, (dof,).
 
-    With the approach d of every mesh under its force F by ``PairDynamics.static``,
+    ``mean`` (mesh,) N and ``scale`` (mesh,) N/m are forces and stiffnesses of the meshes at work.
+    With the approach d of every mesh under its force F by ``MeshTeeth.static``,
 
         K q + D^T F = force,   D q = d(F)
 
@@ -33,14 +39,14 @@ def line_at_rest(
     """
     stiffness, force = _held(line, force)
     reach = np.stack([mesh.direction for mesh in line.meshes])
-    mean = np.array([pair.mesh_force for pair in pairs])
-    scale = np.array([pair.mean_mesh_stiffness for pair in pairs])
     carried, q = mean.copy(), np.zeros(len(force))
     for _ in range(ROUNDS):
         turned = line.rotation * angle + q
         states = [
-            _static(pair, float(turned[mesh.roll_dof]), load)
-            for pair, mesh, load in zip(pairs, line.meshes, carried, strict=True)
+            _static(of_mesh, float(turned[mesh.roll_dof]), load, stiffness)
+            for of_mesh, mesh, load, stiffness in zip(
+                teeth, line.meshes, carried, scale, strict=True
+            )
         ]
         approach, tangent = np.array(states).T
         # mesh forces as deflections of the mean stiffness, so that all rows are of one size
@@ -72,11 +78,16 @@ def _held(line: GearedLine, force: Array) -> tuple[Array, Array]:
     return held, force - momentum * (float(force @ rotation) / inertia)
 
 
-def _static(pair: PairDynamics, turned: float, load: float) -> tuple[float, float]:
-    """Approach in m and tangent stiffness in N/m of a mesh whose driving gear has turned."""
-    roll = pair.start_roll + pair.table.pair.pinion.base_radius * turned
-    static = pair.static(pair.states(np.array([roll])), load)
+def _static(
+    teeth: MeshTeeth, turned: float, load: float, at_work: float
+) -> tuple[float, float]:
+    """Approach in m and tangent stiffness in N/m of a mesh whose driving gear has turned.
+
+    Where no tooth is there the stiffness is that ``at_work``.
+    """
+    roll = teeth.start_roll + teeth.pair.pinion.base_radius * turned
+    static = teeth.static(teeth.states(np.array([roll])), load)
     approach, stiffness = float(static.approach[0]), float(static.stiffness[0])
-    if not (np.isfinite(approach) and stiffness > 0.0):  # no tooth is there
-        return 0.0, pair.mean_mesh_stiffness
+    if not (np.isfinite(approach) and stiffness > 0.0):
+        return 0.0, at_work
     return approach, stiffness

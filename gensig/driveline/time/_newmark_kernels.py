@@ -16,7 +16,7 @@ from gensig.driveline.time._line_mesh_kernels import (
     solve_contact,
     write_pairs,
 )
-from gensig.dynamics._tableau import NEWMARK
+from gensig.driveline.time._scheme import NEWMARK
 from gensig.dynamics._vector import compiled
 
 ANGLE, SPEED, ACCELERATION, MESH_FORCE = range(4)  # kinds of channels

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from gensig.driveline.time.mesh_friction import MeshFriction
 from gensig.errors import ConfigError, GeometryError
-from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS, PairTable
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -150,137 +149,42 @@ class LineMesh:
         return len(self.kinds[0]), len(self.kinds[1])
 
 
-def phase_mesh(
+def even_mesh(
     name: str,
     *,
     direction: Array,
     roll_dof: int,
     n_teeth: tuple[int, int],
-    stiffness: Array,
-    gap: Array | None = None,
-    backlash: float = 0.0,
-    damping: float = 0.0,
-    start_teeth: tuple[int, int] = (0, 0),
-    start_phase: float = 0.0,
-    mirror: float = 0.0,
+    stiffness: float,
+    backlash: float,
+    damping: float,
+    start_phase: float,
+    mirror: float,
 ) -> LineMesh:
-    """A mesh whose whole stiffness is known over its phase: one spring k(u) behind one gap e(u).
-
-    Parameters
-    ----------
-    n_teeth : of gears a and b; gear a is the irregular one where there is one
-    stiffness : (1, node) or (n_teeth of gear a, node) N/m    over one pitch, or pitch after
-        pitch over a turn of gear a, irregular teeth among them; the node that closes a pitch is
-        the first of the next
-    gap : the same shape, m    static transmission error and pitch errors, by which the teeth
-        stand back; default 0
-    """
-    gaps = np.zeros_like(stiffness)
-    if gap is not None:
-        gaps = np.broadcast_to(gap, stiffness.shape)
-    if stiffness.ndim != 2 or len(stiffness) not in (1, n_teeth[0]):
-        raise ConfigError(
-            f"mesh '{name}': stiffness {stiffness.shape} must be (1, node) or "
-            f"({n_teeth[0]}, node), one row a tooth"
-        )
-    n_rows = len(stiffness)
-    # the mesh has rolled u = i + s where row i is at s, and the next row begins where it ends
-    closed, closed_gap = (
-        np.hstack([part, np.roll(part[:, :1], -1, axis=0)])
-        for part in (stiffness, gaps)
-    )
-    rows = np.arange(n_rows)[:, None]
-    # the mirrored roll reads every row backwards, one tooth further on
-    backwards = (rows - 1) % n_rows + n_rows
+    """A mesh of one stiffness in N/m wherever it has rolled, whose teeth are all alike."""
+    row = np.zeros((1, 1), dtype=np.int64)
+    alike = tuple(np.zeros(n, dtype=np.int64) for n in n_teeth)
+    perfect = tuple(np.zeros(n) for n in n_teeth)
     return LineMesh(
         name=name,
         direction=direction,
         roll_dof=roll_dof,
-        stiffness=np.vstack([closed, closed[:, ::-1]]),
-        gap=np.vstack([closed_gap, np.zeros_like(closed_gap)]),
-        rows=rows,
-        coast_rows=backwards,
-        kinds=(np.arange(n_teeth[0]) % n_rows, np.zeros(n_teeth[1], dtype=np.int64)),
-        errors=(np.zeros(n_teeth[0]), np.zeros(n_teeth[1])),
-        tilts=(np.zeros(n_teeth[0]), np.zeros(n_teeth[1])),
+        stiffness=np.full((1, 2), stiffness),
+        gap=np.zeros((1, 2)),
+        rows=row,
+        coast_rows=row,
+        kinds=(alike[0], alike[1]),
+        errors=(perfect[0], perfect[1]),
+        tilts=(perfect[0], perfect[1]),
         upright=0.0,
         n_pairs=1,
         first_pitch=0,
-        start_teeth=start_teeth,
+        start_teeth=(0, 0),
         start_phase=start_phase,
         mirror=mirror,
         backlash=backlash,
         damping=damping,
     )
-
-
-def loaded_gap(approach: Array, stiffness: Array, force: float) -> Array:
-    """Gap e(u) of a ``phase_mesh`` that statics at one load describe, (phase,) m.
-
-    ``approach`` and tangent ``stiffness`` (phase,) in m and N/m under a ``force`` in N, as
-    ``mesh.slices`` gives them for a helical pair: e = approach - F / k, so that the mesh is where
-    statics put it under that force.
-    """
-    return approach - force / stiffness
-
-
-def pair_mesh(
-    name: str,
-    table: PairTable,
-    *,
-    direction: Array,
-    roll_dof: int,
-    damping: float,
-    errors: tuple[Array, Array] | None = None,
-    tilts: tuple[Array, Array] | None = None,
-    start_teeth: tuple[int, int] = (0, 0),
-    start_phase: float = 0.0,
-    friction: MeshFriction | None = None,
-) -> LineMesh:
-    """A spur mesh of our own tables; gear a is the pinion. The law is that of the pair dynamics.
-    ``tilts`` (tooth,) are in m/m, as those of the pair.
-
-    The back flanks are healthy teeth without errors, mirrored as the pair dynamics mirrors them; a
-    missing tooth is missing there too.
-    """
-    pair, kinds = table.pair, (table.pinion.kind, table.wheel.kind)
-    pitch, perfect = pair.base_pitch, (np.zeros(len(kinds[0])), np.zeros(len(kinds[1])))
-    n_kinds = len(table.pinion.compliance), len(table.wheel.compliance)
-    n_nodes = len(table.position)
-    pair_compliance = (
-        _summed(table.pinion.compliance, table.wheel.compliance)
-        - table.shared_compliance
-    )
-    gap = _summed(table.pinion.gap, table.wheel.gap)
-    rows = np.arange(n_kinds[0] * n_kinds[1]).reshape(n_kinds)
-    present = table.pinion.present[:, None] & table.wheel.present[None, :]
-    return LineMesh(
-        name=name,
-        direction=direction,
-        roll_dof=roll_dof,
-        stiffness=(1.0 / pair_compliance).reshape(-1, n_nodes),
-        gap=gap.reshape(-1, n_nodes),
-        rows=np.where(present, rows, -1),
-        coast_rows=np.where(present, 0, -1),
-        kinds=kinds,
-        errors=errors or perfect,
-        tilts=tilts_a_pitch(tilts or perfect, pitch),
-        upright=pair.pitch_point / pitch,
-        n_pairs=N_PAIRS,
-        first_pitch=FIRST_PITCH,
-        start_teeth=start_teeth,
-        start_phase=start_phase,
-        mirror=2.0 * pair.pitch_point / pitch + 0.5,
-        backlash=pair.backlash,
-        damping=damping,
-        shared_compliance=table.shared_compliance,
-        friction=friction,
-    )
-
-
-def tilts_a_pitch(tilts: tuple[Array, Array], pitch: float) -> tuple[Array, Array]:
-    """Tilts of the teeth of both gears in m a pitch, from those in m/m and the pitch in m."""
-    return tilts[0] * pitch, tilts[1] * pitch
 
 
 def mesh_start(
@@ -347,8 +251,3 @@ def tooth_angle(
 def _quarter(drives: bool) -> float:
     """Lead of the flank that touches over the middle of its tooth, pitches."""
     return 0.5 * drives - 0.25
-
-
-def _summed(pinion: Array, wheel: Array) -> Array:
-    """(kind, kind, node) of what both gears add."""
-    return pinion[:, None, :] + wheel[None, :, :]

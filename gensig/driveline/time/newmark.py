@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time import _newmark_kernels as kernels
 from gensig.driveline.time._layout import Work
+from gensig.driveline.time._scheme import NEWMARK
 from gensig.driveline.time.course import LineCourse, ShaftTorque
 from gensig.driveline.time.geared_line import (
     GearedLine,
@@ -24,7 +25,6 @@ from gensig.driveline.time.geared_line import (
     pack_meshes,
     pack_torques,
 )
-from gensig.dynamics._tableau import NEWMARK
 from gensig.dynamics.backends.base import N_SEEN
 from gensig.dynamics.decimation import decimator
 from gensig.errors import ConfigError, SimulationError, StepError

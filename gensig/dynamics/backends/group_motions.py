@@ -182,8 +182,8 @@ def run_until(
         run.advance(group, step, now * n_steps, (begin - now) * n_steps)
         for lane, dynamics in enumerate(lanes):
             if begins[lane] == begin:
-                start = dynamics.static_start(begin * n_steps * step)
-                run.begin(group, lane, start)
+                start = dynamics.start(begin * n_steps * step)
+                run.begin(group, lane, *start)
         now = begin
     run.advance(group, step, now * n_steps, (end - now) * n_steps)
     return run

@@ -26,8 +26,11 @@ class Dynamics(Protocol):
     def dofs(self) -> tuple[str, ...]:
         """Names of the degrees of freedom."""
 
-    def static_start(self, time: float) -> Array:
-        """Deflection at rest at a nominal time, (dof,)."""
+    def start(self, time: float) -> tuple[Array, Array]:
+        """Deflections and their rates from which a motion settles at a nominal time, (dof,) each.
+
+        Rates are 0 where the machine starts at rest.
+        """
 
 
 NOTHING = np.empty(0)
@@ -86,10 +89,10 @@ class GroupRun:
         """Lanes whose state is finite and below a bound, (lane,)."""
         return np.asarray((np.abs(self.state) < bound).all(axis=(0, 1)))
 
-    def begin(self, group: Any, lane: int, deflection: Array) -> None:
-        """Put one lane at rest at a deflection (dof,)."""
-        self.state[:, :, lane] = 0.0
+    def begin(self, group: Any, lane: int, deflection: Array, rate: Array) -> None:
+        """Put one lane at a deflection and its rate, (dof,) each."""
         self.state[0, :, lane] = deflection - group.rest[:, lane]
+        self.state[1, :, lane] = rate
         self.center[lane], self.fresh[lane], self.lost[:, lane] = 0.0, 1.0, 0.0
 
     def take(self, other: GroupRun, lanes: NDArray[np.bool_]) -> None:

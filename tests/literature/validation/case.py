@@ -10,6 +10,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.pair import PairDynamics
 from gensig.errors import ConfigError
 from gensig.faults.base import Fault, faulty_teeth
@@ -178,19 +179,12 @@ def pair_dynamics(case: Case) -> PairDynamics:
     """The equations of motion with perfect teeth."""
     system = case.system
     return PairDynamics(
-        table=case.table,
+        teeth=MeshTeeth.perfect(case.table),
         pinion=system.pinion,
         wheel=system.wheel,
         motor=system.motor,
         load=system.load,
         operating=system.operating,
-        pinion_error=np.zeros(system.pair.pinion.n_teeth),
-        wheel_error=np.zeros(system.pair.wheel.n_teeth),
-        pinion_tilt=np.zeros(system.pair.pinion.n_teeth),
-        wheel_tilt=np.zeros(system.pair.wheel.n_teeth),
-        start_tooth_pinion=0,
-        start_tooth_wheel=0,
-        start_phase=0.0,
     )
 
 

@@ -46,7 +46,7 @@ def passage():
         HIGH,
         SECONDS,
         0.0,
-        tabulated={},
+        teeth={},
         nodes=(FLYWHEEL,),
         n_orders=20,
     )
@@ -120,7 +120,7 @@ def test_speeds_that_make_no_sweep_are_refused(low, high, seconds, message):
             high * RPM,
             seconds,
             0.0,
-            tabulated={},
+            teeth={},
             nodes=(FLYWHEEL,),
             n_orders=10,
         )

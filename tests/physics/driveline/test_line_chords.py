@@ -19,9 +19,9 @@ from line_tools import (
 )
 
 from gensig.driveline.time import _layout as layout
-from gensig.driveline.time.chords import sliced_pair_mesh
 from gensig.driveline.time.course import constant_speed
-from gensig.driveline.time.line_mesh import pair_mesh
+from gensig.driveline.time.toothed_mesh import toothed_mesh
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.errors import ConfigError
 from gensig.faults.broken import MissingTooth
 from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
@@ -35,17 +35,11 @@ STEPS = 64
 N_SAMPLES = 205
 
 
-def placed(make, table, **more):
+def placed(table, **more):
     pair = table.pair
     direction = np.array([pair.pinion.base_radius, -pair.wheel.base_radius])
-    return make(
-        "m",
-        table,
-        direction=direction,
-        roll_dof=0,
-        damping=DAMPING,
-        **more,
-    )
+    teeth = replace(MeshTeeth.perfect(table), **more)
+    return toothed_mesh("m", teeth, direction=direction, roll_dof=0, damping=DAMPING)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +57,6 @@ def mesh(helical):
     rng = np.random.default_rng(4)
     counts = table.pair.pinion.n_teeth, table.pair.wheel.n_teeth
     return placed(
-        sliced_pair_mesh,
         table,
         errors=tuple(rng.normal(0, 2e-6, n) for n in counts),
     )
@@ -154,7 +147,7 @@ class TestLaw:
         where it does on the front.
         """
         table, _ = helical
-        mesh = placed(sliced_pair_mesh, table)
+        mesh = placed(table)
         pair = table.pair
         middle = 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
         start = (pair.pitch_point + middle) / pair.base_pitch + 9.0
@@ -174,8 +167,8 @@ class TestZeroHelix:
     @pytest.mark.parametrize("n_chords", [1, 3])
     def test_a_spur_table_in_chords_is_the_spur_mesh(self, xiamen, n_chords):
         table = xiamen.mesh_table((MissingTooth(gear="pinion", tooth=1),))
-        one = placed(pair_mesh, table)
-        other = placed(sliced_pair_mesh, as_chords(table, n_chords))
+        one = placed(table)
+        other = placed(as_chords(table, n_chords))
         for turned in (0.2, 1.7, 2.4, 23.9):
             for approach in (1e-5, 4e-5, -one.backlash - 2e-5):
                 expected = law_at(one, turned, approach, 1e-2, 1e3)
@@ -238,17 +231,12 @@ class TestAgainstThePair:
         return with_table(dynamics_of(spur, (), **errors), table)
 
     def test_the_same_motion(self, dynamics):
-        mesh = sliced_pair_mesh(
+        mesh = toothed_mesh(
             "pair",
-            dynamics.table,
+            dynamics.teeth,
             direction=dynamics.approach_direction(),
             roll_dof=2,
             damping=dynamics.mesh_damping / dynamics.mesh_force,
-            start_phase=dynamics.start_phase,
-            errors=(
-                dynamics.pinion_error,
-                dynamics.wheel_error,
-            ),
             friction=pair_friction(dynamics),
         )
         q_1, v_1, motion = moved(pair_line(dynamics, mesh), dynamics)

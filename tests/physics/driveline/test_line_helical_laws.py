@@ -12,7 +12,7 @@ from engine_cases import SPEED, TORQUE
 
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.in_time import read_tooth_law, tabulated_meshes
-from gensig.driveline.mesh_phase import first_slice_lead, start_phase, start_rolls
+from gensig.driveline.mesh_phase import first_slice_lead, start_phases, start_rolls
 from gensig.driveline.running import Governor, running_line, steady_course
 from gensig.driveline.teeth import ToothStart, neighbours, tooth_there
 from gensig.driveline.time.newmark import LineSolver
@@ -75,7 +75,7 @@ def running(lateral, teeth):
     engine = read_engine_line(config)
     tabulated = tabulated_meshes(engine, read_tooth_law(config), SPEED, TORQUE)
     course = steady_course(SPEED, TORQUE)
-    line = running_line(engine, course, governor=GOVERNOR, tabulated=tabulated)
+    line = running_line(engine, course, governor=GOVERNOR, teeth=tabulated)
     channels = [("speed", line.dof(14))]
     motion = line.run(SOLVER, duration=0.15, channels=channels, settling=0.2)
     return line, motion, tabulated
@@ -253,7 +253,7 @@ def test_meshes_stand_where_the_crank_puts_them(tooth, phase):
     rolls = start_rolls(drive, turned)
     line = record.line(Run(system=record, faults=(), start=start)).line
 
-    off = [start_phase(drive, record.mesh_number, turned) - phase]
+    off = [start_phases(drive, turned)[record.mesh_number] - phase]
     for mesh, pair, roll in zip(line.meshes, drive.pairs, rolls, strict=True):
         expected = (roll + first_slice_lead(pair)) / pair.base_pitch
         off.append(mesh.start_phase - expected)

@@ -24,8 +24,8 @@ from scipy.integrate import solve_ivp
 
 from benchmarks._engine_line import engine_line, engine_torques
 from gensig.driveline.time.course import constant_speed
-from gensig.driveline.time.line_mesh import pair_mesh
 from gensig.driveline.time.newmark import integrate_line, static_start
+from gensig.driveline.time.toothed_mesh import toothed_mesh
 from gensig.dynamics.pair import PINION_ROTATION
 from gensig.faults.broken import MissingTooth
 
@@ -177,21 +177,12 @@ class TestAgainstThePair:
     @pytest.fixture(scope="class")
     @classmethod
     def line(cls, dynamics):
-        mesh = pair_mesh(
+        mesh = toothed_mesh(
             "pair",
-            dynamics.table,
+            dynamics.teeth,
             direction=dynamics.approach_direction(),
             roll_dof=2,
             damping=dynamics.mesh_damping / dynamics.mesh_force,
-            start_phase=dynamics.start_phase,
-            errors=(
-                dynamics.pinion_error,
-                dynamics.wheel_error,
-            ),
-            tilts=(
-                dynamics.pinion_tilt,
-                dynamics.wheel_tilt,
-            ),
             friction=pair_friction(dynamics),
         )
         return pair_line(dynamics, mesh)

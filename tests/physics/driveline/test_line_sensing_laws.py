@@ -12,7 +12,7 @@ from closeness import assert_close
 from line_tools import IMPLICIT
 
 from gensig.driveline.line_gears import gear_dof
-from gensig.driveline.mesh_phase import start_phase
+from gensig.driveline.mesh_phase import start_phases
 from gensig.driveline.running import Governor, running_line, steady_course
 from gensig.driveline.time.course import LineCourse, ShaftTorque
 from gensig.driveline.time.newmark import LineSolver
@@ -67,7 +67,7 @@ def test_names_follow_the_recorded_mesh_and_the_motion_does_not():
     )
     start = Start(tooth_pinion=5, tooth_wheel=7, phase=0.3)
     turned = one.crank_angle(start)
-    phase = start_phase(other.engine.drive, other.mesh_number, turned)
+    phase = start_phases(other.engine.drive, turned)[other.mesh_number]
     same = Start(phase=phase, line_angle=turned)
     here, there = (
         system.simulate(start=begin).acceleration

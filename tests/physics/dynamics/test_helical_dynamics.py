@@ -8,7 +8,7 @@ import pytest
 from chord_tables import Slices, as_chords, with_table
 from closeness import assert_close
 from energy_balance import balance
-from lane_tools import laws, right_hand_side, trajectory
+from lane_tools import laws, right_hand_side, trajectory, with_teeth
 from scipy.optimize import brentq
 
 import gensig
@@ -75,8 +75,10 @@ class TestZeroHelix:
         chords = with_table(spur, as_chords(spur.table, 3))
         roll = spur.table.pair.base_pitch * (np.arange(50) + 0.5) / 50
         for force in (100.0, 925.0):
-            expected = spur.static(spur.states(roll), force)
-            static = chords.static(chords.states(roll), force)
+            expected, static = (
+                each.teeth.static(each.teeth.states(roll), force)
+                for each in (spur, chords)
+            )
             for name in ("approach", "load", "stiffness"):
                 exact = getattr(expected, name)
                 tolerance = 1e-12 * np.abs(exact).max()
@@ -139,7 +141,8 @@ class TestForces:
             "roll_torque": "classical",
         }
         options = replace(gears.table.options, **plain)
-        still = replace(gears, table=replace(gears.table, options=options))
+        table = replace(gears.table, options=options)
+        still = with_teeth(gears, table=table)
         system = still.system()
         start = gears.static_start(0.0)
         acceleration = right_hand_side(still, 0.0, start, np.zeros(12))
@@ -268,7 +271,7 @@ class TestChords:
                 len(table.depth),
                 axis=2,
             )
-        alone = replace(helical, table=replace(table, **chords))
+        alone = with_teeth(helical, table=replace(table, **chords))
         force = laws(helical, motions)[:, 0]
 
         assert force[-1] < -100.0
@@ -326,7 +329,9 @@ class TestRecords:
         machines = [
             helical,
             narrow,
-            replace(helical, start_phase=0.9, pinion_error=errors),
+            with_teeth(
+                helical, start_phase=0.9, errors=(errors, helical.teeth.errors[1])
+            ),
         ]
         signals = {}
         for precision in ("float64", "float32"):
@@ -346,7 +351,7 @@ class TestRecords:
 
     def test_the_loads_of_the_teeth(self, helical):
         motions = self.motions([helical], with_mesh_state=True)
-        mesh = mesh_state(helical, motions.seen[0], motions.angle[0][0])
+        mesh = mesh_state(helical.teeth, motions.seen[0], motions.angle[0][0])
         n_pairs = helical.table.last_pitch - helical.table.first_pitch
 
         assert mesh.load_share.shape == (n_pairs, 1024)

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lane_tools import law_of
+from lane_tools import law_of, on_any_bodies
 from numpy.testing import assert_allclose
 
 from gensig.driveline.side_by_side.line_records import dynamics_of
 from gensig.driveline.side_by_side.line_statics import line_at_rest
 from gensig.driveline.time.newmark import static_start
+from gensig.operation.options import read_operating
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.inputs import InputReader
@@ -34,6 +35,12 @@ def line(request):
     return dynamics_of(InputReader(config).inputs(record).run)
 
 
+def at_rest(dynamics, line, force):
+    """The deflection of the line, or one like it, under forces at time 0."""
+    mean, scale = dynamics.running.reference_force, dynamics.mesh_stiffness
+    return line_at_rest(line, dynamics.teeth, mean, scale, 0.0, force)
+
+
 @pytest.mark.parametrize("time", [-0.3, 0.2])
 def test_it_is_where_the_implicit_method_has_it(line, time):
     running = line.running
@@ -46,16 +53,19 @@ def test_it_is_where_the_implicit_method_has_it(line, time):
 def test_the_teeth_carry_what_the_springs_do_not(line):
     """By the mesh law of the compiled core."""
     force, running = still_forces(line), line.running.line
-    still = line_at_rest(running, line.pairs, 0.0, force)
+    still = at_rest(line, running, force)
     carried = force - running.stiffness @ still
-    for mesh, pair, load in zip(
-        running.meshes, line.pairs, loads_of(running, carried), strict=True
+    mean = line.running.reference_force
+    operating = read_operating(read_request([]).config.section("operating"))
+    for mesh, teeth, load, usual in zip(
+        running.meshes, line.teeth, loads_of(running, carried), mean, strict=True
     ):
-        radius = pair.table.pair.pinion.base_radius
-        roll = pair.start_roll + radius * still[mesh.roll_dof]
-        found = law_of(pair)(roll, mesh.direction @ still, 0.0, 0.0)[0]
+        radius = teeth.pair.pinion.base_radius
+        roll = teeth.start_roll + radius * still[mesh.roll_dof]
+        law = law_of(on_any_bodies(teeth, usual, operating))
+        found = law(roll, mesh.direction @ still, 0.0, 0.0)[0]
         assert_allclose(found, load, rtol=1e-4)
-        assert load > 0.5 * pair.mesh_force
+        assert load > 0.5 * usual
 
 
 def loads_of(line, carried):
@@ -76,7 +86,7 @@ def test_a_free_line_is_at_rest_in_the_motion_that_nothing_balances(line):
     free = replace(running, stiffness=without_governor(running), held=None)
     force = still_forces(line)
     force[0] += 5.0  # N m more than the load takes
-    deflection = line_at_rest(free, line.pairs, 0.0, force)
+    deflection = at_rest(line, free, force)
     rigid = free.mass @ free.rotation
     share = (force @ free.rotation) / (rigid @ free.rotation)
     pushed = force - share * rigid - free.stiffness @ deflection

@@ -9,7 +9,7 @@ from fault_cases import one
 from lane_tools import laws, motion_of, right_hand_side
 
 from gensig.dynamics._layout import DAMPING
-from gensig.dynamics.lanes import mesh_numbers
+from gensig.dynamics.lanes import pair_numbers
 from gensig.faults.broken import MissingTooth
 
 CRACK = one("crack", tooth=2, crack_depth_mm=2)
@@ -71,7 +71,7 @@ class Reference:
         self.pair = dynamics.table.pair
         self.system = dynamics.system()
         self.shared = self.table.shared_compliance
-        self.damping = mesh_numbers(dynamics, 1e-6, dynamics.rest())[DAMPING]
+        self.damping = pair_numbers(dynamics, 1e-6, dynamics.rest())[DAMPING]
 
     def present(self, index):
         """Pairs whose teeth exist, (pair,)."""
@@ -98,8 +98,9 @@ class Reference:
             for k, kind in enumerate(kinds):
                 place = position[k : k + 1]
                 values[:, k] += columns(side, kind, place, self.table.position)[:, 0]
-            error = tooth_at(getattr(self.d, f"{name}_error"), index)
-            tilt = tooth_at(getattr(self.d, f"{name}_tilt"), index)
+            gear = ("pinion", "wheel").index(name)
+            error = tooth_at(self.d.teeth.errors[gear], index)
+            tilt = tooth_at(self.d.teeth.tilts[gear], index)
             values[2] += error + tilt * (position - self.pair.pitch_point)
             values[3] += tilt
         return position, *values

@@ -82,8 +82,8 @@ def test_slow_gears_have_the_static_shares(run, record):
     result = record(slow)
     dynamics = pair_dynamics(run(slow))
     radius = dynamics.table.pair.pinion.base_radius
-    roll = dynamics.start_roll + radius * result.shaft_angle
-    load = dynamics.static(dynamics.states(roll), dynamics.mesh_force).load
+    roll = dynamics.teeth.start_roll + radius * result.shaft_angle
+    load = dynamics.teeth.static(dynamics.teeth.states(roll), dynamics.mesh_force).load
     expected = np.sort(load / dynamics.mesh_force, axis=1).T
     shares = np.sort(result.mesh.load_share, axis=0)
 

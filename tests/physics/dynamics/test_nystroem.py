@@ -1,11 +1,11 @@
 """Two evaluations of the mesh law a step: the motions of the classical scheme in fine steps."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from fault_cases import one
+from lane_tools import with_teeth
 from stacked_motions import exact_motions, integrate
 
 from gensig.dynamics.decimation import in_band_error
@@ -139,7 +139,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_step(machine, dynamics_of)
     sound = dynamics_of(machine(QUICK))
     steps = (4, 16, 64)
     coarse, fine, exact = (motions([sound], n).acceleration for n in steps)
-    changed = replace(sound, start_phase=sound.start_phase + 1e-4)
+    changed = with_teeth(sound, start_phase=sound.teeth.start_phase + 1e-4)
     other = motions([changed], 64).acceleration
 
     def order(reference):

@@ -8,7 +8,7 @@ from closeness import assert_close
 from fault_cases import GEARS, one
 
 from gensig.dynamics._layout import BACKLASH
-from gensig.dynamics.lanes import mesh_numbers
+from gensig.dynamics.lanes import pair_numbers
 from gensig.faults.flank_form import ProfileError
 from gensig.sensing.manufacturing import draw_specimen, perfect_specimen
 from gensig.systems.base import simulate_together
@@ -50,7 +50,9 @@ def rolls(system):
 def transmission_error(system, specimen, faults=()):
     """Approach under the set torque over a turn of the wheel, (phase,) m: lag of the wheel."""
     dynamics = dynamics_with(system, specimen, faults)
-    return dynamics.static(dynamics.states(rolls(system)), system.mesh_force).approach
+    return dynamics.teeth.static(
+        dynamics.teeth.states(rolls(system)), system.mesh_force
+    ).approach
 
 
 def late(system, specimen):
@@ -155,7 +157,7 @@ def test_drawn_backlash_needs_no_further_tables(xiamen, perfect):
     for factor in (1.0, 1.2):
         dynamics = dynamics_with(xiamen, replace(perfect, backlash_factor=factor))
         assert dynamics.table.pinion is xiamen.mesh_table().pinion
-        backlash = mesh_numbers(dynamics, 1e-6, dynamics.rest())[BACKLASH]
+        backlash = pair_numbers(dynamics, 1e-6, dynamics.rest())[BACKLASH]
         assert_close(backlash, factor * 80 * UM, 1e-9)
 
 

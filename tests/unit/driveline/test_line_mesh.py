@@ -10,14 +10,11 @@ import pytest
 from line_tools import RADII, STIFFNESS, TEETH, law_at
 from numpy.testing import assert_allclose
 
+from benchmarks._phase_mesh import loaded_gap, phase_mesh
 from gensig.driveline.time import _layout as layout
-from gensig.driveline.time.line_mesh import (
-    loaded_gap,
-    mesh_start,
-    pair_mesh,
-    phase_mesh,
-    tooth_angle,
-)
+from gensig.driveline.time.line_mesh import mesh_start, tooth_angle
+from gensig.driveline.time.toothed_mesh import toothed_mesh
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.errors import ConfigError, GeometryError
 from gensig.faults.broken import MissingTooth
 from gensig.mesh.load_distribution import pair_states, static_mesh
@@ -49,15 +46,12 @@ def table(xiamen):
 def pairs(table):
     """Spur pairs that share a body, with tooth errors and tilts."""
     rng = np.random.default_rng(4)
-    return pair_mesh(
-        "m",
-        table,
-        direction=DIRECTION,
-        roll_dof=0,
-        damping=1e-3,
+    teeth = MeshTeeth(
+        table=table,
         errors=(rng.normal(0, 2e-6, 23), rng.normal(0, 2e-6, 84)),
         tilts=(rng.normal(0, 3e-4, 23), rng.normal(0, 3e-4, 84)),
     )
+    return toothed_mesh("m", teeth, direction=DIRECTION, roll_dof=0, damping=1e-3)
 
 
 class TestPhaseTable:

@@ -71,7 +71,7 @@ def assert_independent(runs, orders):
 
 def core_of(machine):
     """The core that integrates a machine."""
-    return THREE_PAIRS if is_followed_by_three(machine) else ANY_LAW
+    return THREE_PAIRS if is_followed_by_three(machine.teeth) else ANY_LAW
 
 
 class CoreRun(GroupRun):
@@ -111,8 +111,8 @@ class CoreRun(GroupRun):
     def restart(self, lane: int) -> None:
         """Put one lane at rest in its equilibrium at the current time."""
         lost = self.lost[:, lane].copy()
-        start = self.machines[lane].static_start(self.now * self.step)
-        self.begin(self.group, lane, start)
+        start = self.machines[lane].start(self.now * self.step)
+        self.begin(self.group, lane, *start)
         self.lost[:, lane] = lost
 
     def means(self, n_steps: int) -> np.ndarray:

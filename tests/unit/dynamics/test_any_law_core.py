@@ -60,9 +60,9 @@ def whole(machines):
 
 
 def test_meshes_that_the_core_of_three_pairs_leaves(machines):
-    assert all(is_followed_by_three(each) for each in machines["spur"])
+    assert all(is_followed_by_three(each.teeth) for each in machines["spur"])
     for kind in ("paper", "helical"):
-        assert not any(is_followed_by_three(each) for each in machines[kind])
+        assert not any(is_followed_by_three(each.teeth) for each in machines[kind])
 
 
 @pytest.mark.parametrize("kind", KINDS)

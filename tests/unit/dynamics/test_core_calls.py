@@ -1,11 +1,10 @@
 """Records of the compiled core: recentred rotations, and blocks of any length."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from closeness import assert_close
 from core_runs import CoreRun
+from lane_tools import with_teeth
 
 from gensig.dynamics._record_kernels import BLOCK
 from gensig.dynamics._vector import LANES, n_lanes
@@ -47,7 +46,7 @@ class TestRecentring:
         one = dynamics_of(xiamen, phase=0.3)
         pair = one.table.pair
         roll = one.operating.speed * cls.SHIFT * STEP * pair.pinion.base_radius
-        return one, replace(one, start_phase=0.3 - roll / pair.base_pitch)
+        return one, with_teeth(one, start_phase=0.3 - roll / pair.base_pitch)
 
     @staticmethod
     def walk(dynamics, first_step, turn=1e-3, n_steps=700):

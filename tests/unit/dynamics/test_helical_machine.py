@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from chord_tables import Slices, as_chords, with_table
 from closeness import assert_close
+from lane_tools import with_teeth
 
 from gensig.dynamics._layout import MOST_PAIRS, HelicalGroup
 from gensig.dynamics.helical import AXIAL_DOFS, half_lag, pitches
@@ -147,10 +148,7 @@ def test_a_gear_without_axial_support_is_refused(helical, key):
 def test_too_many_pairs_are_refused(helical):
     last = helical.table.first_pitch + MOST_PAIRS + 1
     with pytest.raises(ConfigError, match=f"{MOST_PAIRS + 1} pairs of teeth"):
-        replace(
-            helical,
-            table=replace(helical.table, last_pitch=last),
-        )
+        with_teeth(helical, table=replace(helical.table, last_pitch=last))
 
 
 def test_axial_channels_are_those_of_helical_gears(helical, spur):

@@ -51,7 +51,7 @@ def test_static_start_is_in_equilibrium(xiamen, dynamics_of, phase):
     q = dynamics.static_start(0.0)
     stiffness = dynamics.system().stiffness
     approach = q @ dynamics.approach_direction()
-    force = laws(dynamics, [(dynamics.start_roll, approach, 0.0, 0.0)])[0, 0]
+    force = laws(dynamics, [(dynamics.teeth.start_roll, approach, 0.0, 0.0)])[0, 0]
 
     assert_close(force, dynamics.mesh_force, 1e-6)
     assert_close(

@@ -106,10 +106,12 @@ def residual(dynamics, time, q):
     nominal = dynamics.nominal(np.array([time]))
     radius = dynamics.table.pair.pinion.base_radius
     direction = dynamics.approach_direction()
-    states = dynamics.states(dynamics.start_roll + radius * (nominal.angle + q[2]))
+    states = dynamics.teeth.states(
+        dynamics.teeth.start_roll + radius * (nominal.angle + q[2])
+    )
 
     def excess(force):
-        return dynamics.static(states, force).approach[0] - q @ direction
+        return dynamics.teeth.static(states, force).approach[0] - q @ direction
 
     force = brentq(excess, 1e-3, 1e5, rtol=1e-12)
     inertia = system.mass * system.rotation * nominal.acceleration
@@ -377,8 +379,8 @@ class TestMeanStiffness:
 
 
 def test_distant_gears_are_followed_everywhere(whole):
-    far = replace(whole, wheel_error=np.full(84, 2e-4))
+    far = replace(whole.teeth, errors=(np.zeros(23), np.full(84, 2e-4)))
     position = whole.table.position
     assert near_positions(far) == (position[0], position[-1])
-    first, last = near_positions(whole)
+    first, last = near_positions(whole.teeth)
     assert position[0] < first < last < position[-1]

@@ -4,11 +4,8 @@ import numpy as np
 import pytest
 from closeness import assert_close
 
-from gensig.dynamics._tableau import (
-    CUBIC_MIDDLE,
-    NEWMARK,
-    average_acceleration,
-)
+from gensig.driveline.time._scheme import NEWMARK, average_acceleration
+from gensig.dynamics._tables import CUBIC_MIDDLE
 
 
 def test_the_middle_of_a_cubic_is_exact() -> None:

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._layout import EVEN, ODD
 from gensig.dynamics._vector import (
@@ -18,7 +16,6 @@ from gensig.dynamics._vector import (
     compiled,
     get_row,
     inlined,
-    joined,
     load_wide,
     set_row,
     spread,
@@ -29,6 +26,12 @@ from gensig.dynamics._vector import (
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem import _line_layout as lines
 from gensig.dynamics.backends.nystroem._flat import number_at
+from gensig.dynamics.backends.nystroem._line_course import (
+    drive,
+    profile_rows,
+    set_forces,
+    set_rolls,
+)
 from gensig.dynamics.backends.nystroem._line_layout import (
     machine_rows,
     mesh_of,
@@ -38,10 +41,10 @@ from gensig.dynamics.backends.nystroem._line_layout import (
 from gensig.dynamics.backends.nystroem._line_meshes import (
     acceleration,
     couple,
+    damp,
     govern,
     mesh_mobility,
     own_pull,
-    touched,
 )
 from gensig.dynamics.backends.nystroem._motion import (
     DAMPER_SHARE,
@@ -71,11 +74,11 @@ def line_integrator(
     """
 
     @compiled
-    def start(group, slot, fresh, by_tooth, work, wide, near):
+    def start(group, slot, fresh, by_tooth, time, work, wide, near):
         """Set what the step remembers in the lanes that are fresh, from one evaluation there."""
         n = width(work)
         machine = machine_rows(work, group.n_meshes, n)
-        pull_at_begin(group, machine)
+        pull_at_begin(group, time, machine, wide)
         for m in range(group.n_meshes):
             start_mesh(group, m, slot, fresh, by_tooth, machine, work, wide, near)
         for lane in range(n):
@@ -120,7 +123,8 @@ def line_integrator(
                 for m in range(n_meshes):
                     begin_mesh(group, m, slot, fresh, step, machine, work, wide, near)
                 if starting:
-                    start(group, slot, fresh, by_tooth, work, wide, near)
+                    time = number * step
+                    start(group, slot, fresh, by_tooth, time, work, wide, near)
             if angle_row >= 0 and number % per_angle == 0:
                 write_angles(group, angle, angle_row, machine, wide)
                 if len(seen) > 0:
@@ -137,7 +141,9 @@ def line_integrator(
                 moved, rate = to_middle(d * lines.N_BLOCKS, step, 1, machine)
                 own_pull(group, d, moved, rate, machine)
             couple(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
+            damp(group, rows.MIDDLE_V, machine)
             govern(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
+            drive(group, number * step, 0.5 * step, rows.MIDDLE_Q, machine, wide)
             for m in range(n_meshes):
                 push_middle(group, m, step, machine, work, wide, near)
             for d in range(n_dof):
@@ -145,7 +151,9 @@ def line_integrator(
                 moved, rate = predict(d * lines.N_BLOCKS, a, step, 1, machine)
                 own_pull(group, d, moved, rate, machine)
             couple(group, rows.END_Q, rows.END_V, machine)
+            damp(group, rows.END_V, machine)
             govern(group, rows.END_Q, rows.END_V, machine)
+            drive(group, number * step, step, rows.END_Q, machine, wide)
             for m in range(n_meshes):
                 push_end(group, m, next_slot, step, machine, work, wide, near)
             for d in range(n_dof):
@@ -217,12 +225,11 @@ def is_any_fresh(fresh, n):
 def begin_step(group, number, is_first, step, machine, wide):
     """Set rolls and forces at the begin of a step, ``is_first`` of its call."""
     n = width(machine)
-    n_dof = len(group.force) // n
     is_recentred = number % RECENTER == 0
     if is_recentred:
         recenter(group, machine, wide)
     set_rolls(group, number * step, machine, wide)
-    is_changing = len(group.profile) > (lines.N_PROFILE + 2 * n_dof) * n
+    is_changing = len(group.profile) > profile_rows(group, n) * n
     if is_changing or is_recentred or is_first:
         set_forces(group, number * step, machine, wide)
 
@@ -267,81 +274,16 @@ def recenter(group, machine, wide):
 
 
 @inlined
-def _cell(group, time, n_rows, n):
-    """First row of the profile's cell at a time, and the time since its begin."""
-    n_cells = len(group.profile) // (n_rows * n)
-    cell = int(np.floor(time * group.cells_per_second)) - group.profile_first
-    cell = min(max(cell, 0), n_cells - 1)
-    since = time - (group.profile_first + cell) / group.cells_per_second
-    return cell * n_rows, since
-
-
-@inlined
-def set_rolls(group, time, machine, wide):
-    """Set the nominal angle and the roll of every mesh at the begin of a step."""
-    n = width(machine)
-    n_dof, n_meshes = len(group.force) // n, group.n_meshes
-    profile = group.profile
-    cell, since = _cell(group, time, lines.N_PROFILE + 2 * n_dof, n)
-    for first in range(0, n, EIGHT):
-        speed = load_wide(profile, at(cell + lines.SPEED, first, n))
-        gain = load_wide(profile, at(cell + lines.GAIN, first, n))
-        turned = since * (speed + (0.5 * since) * gain)
-        turned = load_wide(profile, at(cell + lines.ANGLE, first, n)) + turned
-        turned = turned + load_wide(wide, at(layout.CENTER, first, n))
-        store(wide, at(layout.NOMINAL, first, n), turned)
-        for m in range(n_meshes):
-            own = of(rows.Q, touched(group, m, lines.A_TURN))
-            roll = turned * load_wide(group.turning, at(m, first, n))
-            roll = roll + load_wide(machine, at(own, first, n))
-            exact = m * layout.N_EXACT
-            radius = load_wide(group.exact, at(exact + layout.EXACT_RADIUS, first, n))
-            roll = radius * roll
-            begun = load_wide(group.exact, at(exact + layout.START_ROLL, first, n))
-            base = m * rows.N_WIDE + layout.BASE
-            store(wide, at(base, first, n), begun + roll)
-
-
-@inlined
-def set_forces(group, time, machine, wide):
-    """Set nominal speed and every force but those of meshes at the begin of a step."""
-    n = width(machine)
-    n_dof = len(group.force) // n
-    profile, n_rows = group.profile, lines.N_PROFILE + 2 * n_dof
-    cell, since = _cell(group, time, n_rows, n)
-    speed = _in_row(profile, cell + lines.SPEED, machine)
-    gain = _in_row(profile, cell + lines.GAIN, machine)
-    center = _in_row(wide, layout.CENTER, machine)
-    set_row(machine, rows.DRIVE + layout.DRIVE_CENTER, center)
-    set_row(machine, rows.DRIVE + layout.DRIVE_SPEED, speed + since * gain)
-    set_row(machine, rows.DRIVE + layout.DRIVE_GAIN, gain)
-    for d in range(n_dof):
-        given = get_row(group.force, d) - gain * get_row(group.carried, d)
-        if len(profile) > n_rows * n:
-            row = cell + lines.N_PROFILE + 2 * d
-            given = given + _in_row(profile, row, machine)
-            given = given + since * _in_row(profile, row + 1, machine)
-        set_row(machine, of(rows.FORCES, d), given)
-
-
-@inlined
-def _in_row(exact, row, work):
-    """A float64 row as one of the precision of the scratch."""
-    n = width(work)
-    low = load_wide(exact, at(row, 0, n))
-    high = load_wide(exact, at(row, n - EIGHT, n))
-    return joined(work, low, high)
-
-
-@inlined
-def pull_at_begin(group, machine):
+def pull_at_begin(group, time, machine, wide):
     """Set all forces but those of meshes from the state at the begin of a step."""
     q, v = rows.Q, rows.V
     for d in range(len(group.force) // width(machine)):
         moved, rate = get_row(machine, of(q, d)), get_row(machine, of(v, d))
         own_pull(group, d, moved, rate, machine)
     couple(group, q, v, machine)
+    damp(group, v, machine)
     govern(group, q, v, machine)
+    drive(group, time, 0.0, q, machine, wide)
 
 
 @inlined

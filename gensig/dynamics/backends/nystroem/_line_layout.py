@@ -32,8 +32,15 @@ PULL = rows.DRIVE + layout.DRIVE_TORQUE
 A_X, A_Y, A_TURN, B_X, B_Y, B_TURN, N_TOUCHED = range(7)
 NONE = -1
 # rows of a cell of ``LineGroup.profile``; behind them follow force and its slope of every degree of
-# freedom
+# freedom, then factor and its slope of every source
 ANGLE, SPEED, GAIN, N_PROFILE = range(4)
+# rows of ``LineGroup.source_numbers``: nodes per radian, place at angle 0 in nodes, nodes of a
+# period and one over them, index of the first node
+NODES_PER_RAD, SHIFT, NODES, PER_NODES, FIRST_NODE, N_SOURCE = range(6)
+PERIODS_BEFORE = 1024  # of a source, before its angle 0
+# numbers of a node of ``LineGroup.source_table``, its torque and the rise to the next, and those
+# that a reading takes from there on
+PER_NODE, READ_AT_ONCE = 2, 8
 
 
 class LineGroup(NamedTuple):
@@ -54,10 +61,13 @@ class LineGroup(NamedTuple):
     motion of the reference and the forces that come with it. ``reference`` is the degree of
     freedom whose rotation is 1, ``angles`` those whose angles are given out. ``stiffness`` and
     ``damping`` are diagonals; their other entries (entry, lane) are ``sprung`` and ``damped``, of
-    the degrees of freedom ``coupled`` (entry, 2), each pair once. The governor is
+    the degrees of freedom ``coupled`` (entry, 2), each pair once. Where there is no spring,
+    ``damper`` (entry, lane) are those of a degree of freedom from its ``damper_first`` (dof + 1,)
+    on, with others before it, ``damper_other`` (entry,). The governor is
     no part of them: its stiffness is ``held`` (dof, lane) times ``held``, its damping
-    ``held_damping`` (lane,) s times as much, on ``turning_dofs``. Other fields are those of
-    ``Group``.
+    ``held_damping`` (lane,) s times as much, on ``turning_dofs``. ``sources`` are the degrees of
+    freedom on which torques act that follow their angle: ``source_numbers`` (source, row, lane)
+    say where the nodes of each are in ``source_table``. Other fields are those of ``Group``.
     """
 
     n_meshes: int
@@ -85,6 +95,9 @@ class LineGroup(NamedTuple):
     coupled: Any
     sprung: Any
     damped: Any
+    damper_first: Any
+    damper_other: Any
+    damper: Any
     force: Any
     rest: Any
     rotation: Any
@@ -98,6 +111,9 @@ class LineGroup(NamedTuple):
     cells_per_second: float
     reference: int
     angles: Any
+    sources: Any
+    source_numbers: Any
+    source_table: Any
 
 
 class ChordLineGroup(LineGroup):

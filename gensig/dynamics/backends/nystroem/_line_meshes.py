@@ -201,6 +201,36 @@ def _couple(group, k, a, b, q, v, machine):
         set_row(machine, pulled, get_row(machine, pulled) - spring)
 
 
+@inlined
+def damp(group, rates, machine):
+    """Add the forces of dampers between degrees of freedom that no spring joins.
+
+    Losses by mode join all of them: the sum on one of them stays in a register.
+    """
+    for d in range(len(group.damper_first) - 1):
+        begin, end = (
+            number_at(group.damper_first, d),
+            number_at(group.damper_first, d + 1),
+        )
+        if begin < end:
+            rate, force = (
+                get_row(machine, of(rates, d)),
+                get_row(machine, of(lines.ON, d)),
+            )
+            for k in range(begin, end):
+                force = _damp(group, k, rate, force, rates, machine)
+            set_row(machine, of(lines.ON, d), force)
+
+
+@written
+def _damp(group, k, rate, force, rates, machine):
+    """Force on a degree of freedom less that of a damper, whose other end gets its own."""
+    other, damper = number_at(group.damper_other, k), get_row(group.damper, k)
+    pulled = of(lines.ON, other)
+    set_row(machine, pulled, get_row(machine, pulled) - damper * rate)
+    return force - damper * get_row(machine, of(rates, other))
+
+
 @written
 def acceleration(group, d, machine):
     """Acceleration of a degree of freedom under all forces."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._tableau import CUBIC_MIDDLE
+from gensig.dynamics._tables import CUBIC_MIDDLE
 from gensig.dynamics._vector import (
     EIGHT,
     any_above,

@@ -34,7 +34,9 @@ from gensig.dynamics.backends.step_limits import (
     warn_of_coarse_step,
 )
 from gensig.dynamics.lanes import pack
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.pair import PairDynamics
+from gensig.mesh.pair_table import PairTable
 
 # beyond it a pair may carry outside of the path that the core follows
 MOST_CONTACT_RATIO = 2.5
@@ -131,7 +133,7 @@ class Nystroem(Backend):
         """Motions of machines, integrated in groups of the same core and settling stages."""
         by_core: dict[bool, list[int]] = {}
         for index, machine in enumerate(machines):
-            by_core.setdefault(is_followed_by_three(machine), []).append(index)
+            by_core.setdefault(is_followed_by_three(machine.teeth), []).append(index)
         cores = {True: THREE_PAIRS, False: ANY_LAW}
         motions = (
             (
@@ -145,12 +147,12 @@ class Nystroem(Backend):
         return in_order(motions, len(machines))
 
 
-def is_followed_by_three(machine: PairDynamics) -> bool:
-    """True for a pair that the core of three pairs of teeth covers."""
-    pair, options = machine.table.pair, machine.table.options
+def is_followed_by_three(teeth: MeshTeeth) -> bool:
+    """True for a mesh that the core of three pairs of teeth covers."""
+    pair, options = teeth.pair, teeth.table.options
     contact_ratio = pair.path_of_contact / pair.base_pitch
     return (
-        not machine.is_helical
+        isinstance(teeth.table, PairTable)
         and options.law == "one_sided"
         and contact_ratio <= MOST_CONTACT_RATIO
     )

@@ -70,7 +70,7 @@ class TimeCase:
         )
         own = tabulated_meshes(self.line, read_tooth_law(self.config), speed, torque)
         return time_response(
-            self.line, speed, torque, tabulated=own, nodes=NODES, duration=DURATION
+            self.line, speed, torque, teeth=own, nodes=NODES, duration=DURATION
         )
 
     @property

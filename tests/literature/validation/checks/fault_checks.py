@@ -8,11 +8,12 @@ from gensig.faults.base import faulty_teeth
 from gensig.faults.flank_loss import pitch_abscissa, root_chord_abscissa
 from gensig.faults.pitting import Pitting
 from gensig.geometry.tooth import Tooth
-from gensig.mesh.pair_table import pair_compliance, structural_compliance
+from gensig.mesh.pair_table import structural_compliance
 from validation.case import Case, read_case, with_fault, with_words
 from validation.checks.body_checks import structure
 from validation.checks.geometry_checks import Check
 from validation.checks.mesh_checks import mesh_stiffness, single_pair_stiffness
+from validation.pair_compliances import pair_compliance
 
 
 def _faulty_tooth(case: Case) -> Tooth:

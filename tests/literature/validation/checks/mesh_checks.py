@@ -7,9 +7,9 @@ import numpy as np
 from gensig.faults.base import faulty_teeth
 from gensig.mesh.load_distribution import StaticMesh, pair_states, static_mesh
 from gensig.mesh.local_contact import contact_law
-from gensig.mesh.pair_table import pair_compliance
 from validation.case import Array, Case, with_words
 from validation.checks.geometry_checks import Check
+from validation.pair_compliances import pair_compliance
 
 N_MEAN = 4000  # points of a mean over a zone
 

@@ -1,0 +1,153 @@
+"""Nominal motion of a line's reference over time, and the forces that come with it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gensig.dynamics import _layout as layout
+from gensig.dynamics._vector import (
+    EIGHT,
+    any_above,
+    at,
+    cells,
+    get_row,
+    inlined,
+    joined,
+    load_wide,
+    set_row,
+    spread,
+    store,
+    truncated,
+    width,
+)
+from gensig.dynamics._written import written
+from gensig.dynamics.backends.nystroem import _layout as rows
+from gensig.dynamics.backends.nystroem import _line_layout as lines
+from gensig.dynamics.backends.nystroem._flat import number_at
+from gensig.dynamics.backends.nystroem._line_layout import of
+from gensig.dynamics.backends.nystroem._line_meshes import touched
+
+
+@inlined
+def profile_rows(group, n):
+    """Rows of a cell of the profile of a group of ``n`` lanes."""
+    return lines.N_PROFILE + 2 * (len(group.force) // n + len(group.sources))
+
+
+@inlined
+def _cell(group, time, n):
+    """First row of the profile's cell at a time, and the time since its begin."""
+    n_rows = profile_rows(group, n)
+    n_cells = len(group.profile) // (n_rows * n)
+    cell = int(np.floor(time * group.cells_per_second)) - group.profile_first
+    cell = min(max(cell, 0), n_cells - 1)
+    since = time - (group.profile_first + cell) / group.cells_per_second
+    return cell * n_rows, since
+
+
+@inlined
+def set_rolls(group, time, machine, wide):
+    """Set the nominal angle and the roll of every mesh at the begin of a step."""
+    n = width(machine)
+    n_meshes, profile = group.n_meshes, group.profile
+    cell, since = _cell(group, time, n)
+    for first in range(0, n, EIGHT):
+        speed = load_wide(profile, at(cell + lines.SPEED, first, n))
+        gain = load_wide(profile, at(cell + lines.GAIN, first, n))
+        turned = since * (speed + (0.5 * since) * gain)
+        turned = load_wide(profile, at(cell + lines.ANGLE, first, n)) + turned
+        turned = turned + load_wide(wide, at(layout.CENTER, first, n))
+        store(wide, at(layout.NOMINAL, first, n), turned)
+        for m in range(n_meshes):
+            own = of(rows.Q, touched(group, m, lines.A_TURN))
+            roll = turned * load_wide(group.turning, at(m, first, n))
+            roll = roll + load_wide(machine, at(own, first, n))
+            exact = m * layout.N_EXACT
+            radius = load_wide(group.exact, at(exact + layout.EXACT_RADIUS, first, n))
+            roll = radius * roll
+            begun = load_wide(group.exact, at(exact + layout.START_ROLL, first, n))
+            base = m * rows.N_WIDE + layout.BASE
+            store(wide, at(base, first, n), begun + roll)
+
+
+@inlined
+def set_forces(group, time, machine, wide):
+    """Set nominal speed and all forces that follow neither meshes, state nor angles."""
+    n = width(machine)
+    n_dof = len(group.force) // n
+    profile = group.profile
+    cell, since = _cell(group, time, n)
+    speed = _in_row(profile, cell + lines.SPEED, machine)
+    gain = _in_row(profile, cell + lines.GAIN, machine)
+    center = _in_row(wide, layout.CENTER, machine)
+    set_row(machine, rows.DRIVE + layout.DRIVE_CENTER, center)
+    set_row(machine, rows.DRIVE + layout.DRIVE_SPEED, speed + since * gain)
+    set_row(machine, rows.DRIVE + layout.DRIVE_GAIN, gain)
+    for d in range(n_dof):
+        given = get_row(group.force, d) - gain * get_row(group.carried, d)
+        if len(profile) > profile_rows(group, n) * n:
+            row = cell + lines.N_PROFILE + 2 * d
+            given = given + _in_row(profile, row, machine)
+            given = given + since * _in_row(profile, row + 1, machine)
+        set_row(machine, of(rows.FORCES, d), given)
+
+
+@inlined
+def _in_row(exact, row, work):
+    """A float64 row as one of the precision of the scratch."""
+    n = width(work)
+    low = load_wide(exact, at(row, 0, n))
+    high = load_wide(exact, at(row, n - EIGHT, n))
+    return joined(work, low, high)
+
+
+@inlined
+def drive(group, begin, since, q, machine, wide):
+    """Add the torques that follow an angle to the rows ``ON``, ``since`` s after a step's begin.
+
+    ``begin`` is the time of it, ``q`` the block of the state at the instant.
+    """
+    n, n_sources = width(machine), len(group.sources)
+    cell, in_cell = _cell(group, begin + since, n)
+    row = cell + profile_rows(group, n) - 2 * n_sources
+    zero = spread(machine, 0.0)
+    for s in range(n_sources):
+        factor = _in_row(group.profile, row + 2 * s, machine)
+        factor = factor + in_cell * _in_row(group.profile, row + 2 * s + 1, machine)
+        if any_above(factor * factor, zero):
+            d = number_at(group.sources, s)
+            torque = factor * _over_angle(group, s, d, since, q, machine, wide)
+            pushed = of(lines.ON, d)
+            set_row(machine, pushed, get_row(machine, pushed) + torque)
+
+
+@inlined
+def _over_angle(group, s, d, since, q, machine, wide):
+    """Number of a source's table at the angle of its degree of freedom, straight between nodes."""
+    last = width(machine) - EIGHT
+    low, low_share = _place(group, s, d, since, q, 0, machine, wide)
+    high, high_share = _place(group, s, d, since, q, last, machine, wide)
+    node = cells(group.source_table, low, high)
+    return node[0] + joined(machine, low_share, high_share) * node[1]
+
+
+@written
+def _place(group, s, d, since, q, first, machine, wide):
+    """Index of the node before the angle, for eight lanes from one on, and the share of the way
+    to the next one.
+    """
+    n = width(machine)
+    speed = load_wide(machine, at(rows.DRIVE + layout.DRIVE_SPEED, first, n))
+    gain = load_wide(machine, at(rows.DRIVE + layout.DRIVE_GAIN, first, n))
+    angle = load_wide(wide, at(layout.NOMINAL, first, n))
+    angle = angle + since * (speed + (0.5 * since) * gain)
+    angle = angle * load_wide(group.exact_rotation, at(d, first, n))
+    angle = angle + load_wide(machine, at(of(q, d), first, n))
+    per_rad, shift, nodes, per_nodes, first_node = (
+        load_wide(group.source_numbers, at(s * lines.N_SOURCE + name, first, n))
+        for name in range(lines.N_SOURCE)
+    )
+    place = angle * per_rad + shift
+    place = place - nodes * truncated(place * per_nodes)
+    node = truncated(place)
+    return first_node + float(lines.PER_NODE) * node, place - node
