@@ -15,7 +15,7 @@ import sys
 import types
 import typing
 from collections.abc import Collection, Iterator, Mapping
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from gensig.errors import ConfigError
 
@@ -141,24 +141,48 @@ def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T
         raise ConfigError(
             f"{where} = {values!r} must be a group of keys, not one value"
         )
-    names = {
-        key: field
-        for key, field in _boundary_fields(cls).items()  # type: ignore[arg-type]
-        if field.name not in given
-    }
-    hints = _hints(cls)  # type: ignore[arg-type]
+    if given:
+        return _filled(cls, values, where, given)
+    try:
+        kinds = tuple(map(type, values.values()))
+        return _kept(cls, where, tuple(values.items()), kinds)  # type: ignore[arg-type, return-value]
+    except TypeError:  # a list has no hash
+        return _filled(cls, values, where, given)
+
+
+@functools.lru_cache(maxsize=256)
+def _kept(
+    cls: type[T],
+    where: str,
+    items: tuple[tuple[str, Any], ...],
+    kinds: tuple[type, ...],
+) -> T:
+    """What was read of equal keys: the machines of a plan differ in a few of them.
+
+    ``kinds`` are types of the values: true is equal to 1.
+    """
+    return _filled(cls, dict(items), where, {})
+
+
+def _filled(
+    cls: type[T], values: Mapping[str, Any], where: str, given: Mapping[str, Any]
+) -> T:
+    keys = _keys(cls)  # type: ignore[arg-type]
     result = dict(given)
     for key, value in values.items():
-        if key not in names:
+        known = keys.get(key)
+        if known is None or known.field.name in given:
+            names = {
+                name: each.field
+                for name, each in keys.items()
+                if each.field.name not in given
+            }
             raise ConfigError(f"{where}: {_unknown(key, names)}")
-        field = names[key]
-        result[field.name] = _convert(f"{where}.{key}", key, value, hints[field.name])
+        result[known.field.name] = _convert(where, key, value, known)
     missing = [
         name
-        for name, field in names.items()
-        if field.name not in result
-        and field.default is dataclasses.MISSING
-        and field.default_factory is dataclasses.MISSING
+        for name, known in keys.items()
+        if known.is_required and known.field.name not in result
     ]
     if missing:
         raise ConfigError(f"{where}: missing {', '.join(missing)}")
@@ -251,16 +275,30 @@ def _shown(group: Any, name: str, *values: float) -> tuple[str, list[str]]:
     return key, [f"{from_si(key, value):g}" for value in values]
 
 
-@functools.lru_cache(maxsize=64)
-def _boundary_fields(cls: type) -> dict[str, dataclasses.Field[Any]]:
-    """Fields of a dataclass by their boundary names."""
-    return {_boundary_name(field): field for field in dataclasses.fields(cls)}
+class _Key(NamedTuple):
+    """A key of a file: the field that it fills, types that it may have, SI value of its unit."""
+
+    field: dataclasses.Field[Any]
+    kinds: tuple[Any, ...]
+    factor: float
+    is_required: bool
 
 
-@functools.lru_cache(maxsize=64)
-def _hints(cls: type) -> dict[str, Any]:
-    """Types of a dataclass's fields; their lookup costs more than all else in reading one."""
-    return typing.get_type_hints(cls)
+@functools.lru_cache(maxsize=128)
+def _keys(cls: type) -> dict[str, _Key]:
+    """Keys of a dataclass by their boundary names, which cost more than reading one."""
+    hints, keys = typing.get_type_hints(cls), {}
+    for field in dataclasses.fields(cls):
+        name, hint = _boundary_name(field), hints[field.name]
+        kinds = (hint,)
+        if isinstance(hint, types.UnionType):
+            kinds = typing.get_args(hint)
+        default = field.default
+        if field.default_factory is not dataclasses.MISSING:
+            default = field.default_factory
+        is_required = default is dataclasses.MISSING
+        keys[name] = _Key(field, kinds, to_si(name, 1.0), is_required)
+    return keys
 
 
 def _boundary_name(field: dataclasses.Field[Any]) -> str:
@@ -278,17 +316,15 @@ def _unknown(key: str, names: Mapping[str, dataclasses.Field[Any]]) -> str:
     return f"unknown key '{key}'; {hint}"
 
 
-def _convert(name: str, key: str, value: Any, hint: Any) -> Any:
-    kinds = (hint,)
-    if isinstance(hint, types.UnionType):
-        kinds = typing.get_args(hint)
-    if value is None and type(None) in kinds:
-        return None
-    if value is None:
-        raise ConfigError(f"{name} is null; give a value")
-    factor = to_si(key, 1.0)
+def _convert(where: str, key: str, value: Any, known: _Key) -> Any:
+    kinds, factor = known.kinds, known.factor
     if float in kinds and is_number(value):
         return float(value) * factor
+    if value is None and type(None) in kinds:
+        return None
+    name = f"{where}.{key}"
+    if value is None:
+        raise ConfigError(f"{name} is null; give a value")
     if any(_is_a(kind, value) for kind in (int, bool, str) if kind in kinds):
         return value
     for kind, row in LISTS.items():

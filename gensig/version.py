@@ -3,4 +3,4 @@
 A change of bits is a change of version.
 """
 
-__version__ = "0.19.1"
+__version__ = "0.20.0"

@@ -6,13 +6,14 @@ Stiffness, gaps, arms of friction.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.helical import half_lag
 from gensig.mesh.load_distribution import (
+    PERFECT,
+    Meeting,
     PairStates,
     StaticMesh,
     pair_states,
@@ -32,15 +33,12 @@ PER_PITCH = 32  # phases of a base pitch over which the stiffness is averaged
 
 
 def tooth_states(
-    table: PairTable | SlicedTable, roll: Array, **teeth: Any
+    table: PairTable | SlicedTable, roll: Array, meeting: Meeting = PERFECT
 ) -> PairStates | ChordStates:
-    """Pairs of teeth at rolls of the pinion in m, (phase,).
-
-    ``teeth`` are the teeth at the start, errors and tilts that ``pair_states`` takes.
-    """
+    """Pairs of teeth at rolls of the pinion in m, (phase,)."""
     if isinstance(table, SlicedTable):
-        return chord_states(table, roll, **teeth)
-    return pair_states(table, roll, **teeth)
+        return chord_states(table, roll, meeting)
+    return pair_states(table, roll, meeting)
 
 
 def static_load(

@@ -15,7 +15,7 @@ from gensig.dynamics.mesh_statics import (
     tooth_states,
 )
 from gensig.geometry.contact import GearPair
-from gensig.mesh.load_distribution import PairStates, StaticMesh
+from gensig.mesh.load_distribution import Meeting, PairStates, StaticMesh
 from gensig.mesh.pair_table import PairTable
 from gensig.mesh.sliced.sliced_statics import ChordStates
 from gensig.mesh.sliced.sliced_table import SlicedTable
@@ -80,19 +80,15 @@ class MeshTeeth:
 
     def states(self, roll: Array) -> PairStates | ChordStates:
         """Pairs of teeth at rolls of the pinion in m, (phase,)."""
-        return tooth_states(self.table, roll, **self._in_states)
+        return tooth_states(self.table, roll, self.meeting)
 
     def static(self, states: PairStates | ChordStates, force: float) -> StaticMesh:
         """Equilibrium of pairs of teeth under a normal force in N."""
         return static_load(self.table, states, force)
 
     @property
-    def _in_states(self) -> dict[str, Any]:
-        return {
-            "start_tooth_pinion": self.start_teeth[0],
-            "start_tooth_wheel": self.start_teeth[1],
-            "pinion_error": self.errors[0],
-            "wheel_error": self.errors[1],
-            "pinion_tilt": self.tilts[0],
-            "wheel_tilt": self.tilts[1],
-        }
+    def meeting(self) -> Meeting:
+        """Start teeth and errors, for statics."""
+        return Meeting(
+            start_teeth=self.start_teeth, errors=self.errors, tilts=self.tilts
+        )

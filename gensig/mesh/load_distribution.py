@@ -57,24 +57,32 @@ def cells(nodes: Array, position: Array) -> tuple[NDArray[np.int64], Array]:
     return np.maximum(cell, 0), scaled - cell
 
 
-def pair_states(
-    table: PairTable,
-    roll: Array,
-    *,
-    start_tooth_pinion: int = 0,
-    start_tooth_wheel: int = 0,
-    pinion_error: Array | None = None,
-    wheel_error: Array | None = None,
-    pinion_tilt: Array | None = None,
-    wheel_tilt: Array | None = None,
-) -> PairStates:
-    """Pairs at the pinion's roll, (phase,) m along the line of action; at 0 the start teeth enter
-    at A.
+OfTeeth = tuple[Array | None, Array | None]  # of pinion and wheel, (tooth,); None: 0
 
-    ``pinion_error`` and ``wheel_error`` (tooth,) m open the gaps at the pitch point,
-    ``pinion_tilt`` and ``wheel_tilt`` (tooth,) m/m by as much more for every metre further along
-    the path.
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Meeting:
+    """Start teeth of a mesh, and the errors of single teeth, of pinion and wheel.
+
+    Parameters
+    ----------
+    start_teeth : teeth that enter at A at roll 0; of helical ones their first slices
+    errors : m     gap at the pitch point
+    tilts : m/m    growth of the gap with the position along the path
     """
+
+    start_teeth: tuple[int, int] = (0, 0)
+    errors: OfTeeth = (None, None)
+    tilts: OfTeeth = (None, None)
+
+
+PERFECT = Meeting()
+
+
+def pair_states(
+    table: PairTable, roll: Array, meeting: Meeting = PERFECT
+) -> PairStates:
+    """Pairs at the pinion's roll, (phase,) m along the line of action."""
     pitch = table.pair.base_pitch
     newest = np.floor(roll / pitch).astype(np.int64)
     index = newest[:, None] + 1 - np.arange(N_PAIRS)
@@ -83,11 +91,9 @@ def pair_states(
     beyond = position - table.pair.pitch_point
     compliance = np.full(position.shape, -table.shared_compliance)
     gap = np.zeros(position.shape)
-    sides = (
-        (table.pinion, start_tooth_pinion, pinion_error, pinion_tilt),
-        (table.wheel, start_tooth_wheel, wheel_error, wheel_tilt),
-    )
-    for side, start, error, tilt in sides:
+    sides = table.pinion, table.wheel
+    teeth = zip(sides, meeting.start_teeth, meeting.errors, meeting.tilts, strict=True)
+    for side, start, error, tilt in teeth:
         n_teeth = len(side.kind)
         add_teeth(
             index + start,

@@ -124,7 +124,7 @@ class Configuration(Mapping[str, Any]):
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         self._values: dict[str, Any] = {
-            name: dict(value._values) if isinstance(value, Section) else value
+            name: dict(value._values) if type(value) is Section else value
             for name, value in values.items()
         }
 
@@ -175,11 +175,7 @@ class Configuration(Mapping[str, Any]):
         ------
         ConfigError    for a key that does not exist, holds no number, or is fixed for a data set
         """
-        varied = {key.partition(".")[0] for key in values}
-        changed = {
-            name: copy.deepcopy(value) if name in varied else value
-            for name, value in self._values.items()
-        }
+        changed = dict(self._values)
         for key, value in values.items():
             self._replace(changed, key, value)
         return Configuration(changed)
@@ -189,7 +185,7 @@ class Configuration(Mapping[str, Any]):
         return copy.deepcopy(self._values)
 
     def _replace(self, changed: dict[str, Any], key: str, value: float) -> None:
-        """Set a dotted key that must exist and hold a number."""
+        """Set a dotted key that must exist and hold a number, in copies of its groups."""
         if key.startswith(FIXED_KEYS):
             raise ConfigError(
                 f"plan.vary: '{key}' is one value for a whole data set; give several with "
@@ -198,7 +194,10 @@ class Configuration(Mapping[str, Any]):
         *parents, leaf = key.split(".")
         node: Any = changed
         for name in parents:
-            node = node.get(name) if isinstance(node, dict) else None
+            below = node.get(name) if isinstance(node, dict) else None
+            if isinstance(below, dict):
+                below = node[name] = dict(below)
+            node = below
         if not isinstance(node, dict) or not _is_number(node.get(leaf, "")):
             known = [
                 name

@@ -30,9 +30,8 @@ from gensig.systems.base import Machine, MachineMesh, simulate_together, specime
 from gensig.systems.integration_checks import (
     check_steps,
     checks,
-    finer,
-    is_too_coarse,
     not_finite,
+    records_by_kind,
 )
 from gensig.systems.run import CleanRecord, Run, Start, angle_from_tooth_0
 from gensig.systems.supports import in_gearbox
@@ -229,7 +228,7 @@ def pair_dynamics(run: PairRun) -> PairDynamics:
     )
 
 
-def _kind(run: PairRun) -> tuple[object, ...]:
+def _kind(run: PairRun, _: PairDynamics) -> tuple[object, ...]:
     """All values that runs must share to be integrated in one call."""
     system = run.system
     return (
@@ -255,26 +254,15 @@ def simulate_pairs(runs: Sequence[PairRun]) -> list[CleanRecord | SimulationErro
     depend on the other runs. A motion that does not stay finite gives its error in place of its
     record.
     """
-    results: dict[int, CleanRecord | SimulationError] = {}
-    machines: dict[int, PairDynamics] = {}
-    kinds: dict[tuple[object, ...], list[int]] = {}
-    for index, run in enumerate(runs):
-        system = run.system
-        try:
-            machines[index] = pair_dynamics(run)
-            check_machine(machines[index], system.solver, system.sensing.sampling_rate)
-        except SimulationError as error:
-            results[index] = error
-        else:
-            kinds.setdefault(_kind(run), []).append(index)
-    for kind in kinds.values():
-        records = _side_by_side([runs[i] for i in kind], [machines[i] for i in kind])
-        results.update(zip(kind, records, strict=True))
-    coarse = [i for i, record in results.items() if is_too_coarse(runs[i], record)]
-    if coarse:
-        again = simulate_pairs([finer(runs[i]) for i in coarse])
-        results.update(zip(coarse, again, strict=True))
-    return [results[index] for index in range(len(runs))]
+    return records_by_kind(
+        runs, dynamics_of=_checked_dynamics, kind_of=_kind, integrate=_side_by_side
+    )
+
+
+def _checked_dynamics(run: PairRun) -> PairDynamics:
+    dynamics, system = pair_dynamics(run), run.system
+    check_machine(dynamics, system.solver, system.sensing.sampling_rate)
+    return dynamics
 
 
 def _side_by_side(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
 from gensig.material import Material
+from gensig.mesh.load_distribution import Meeting
 from gensig.mesh.modification import PairModification
 from gensig.mesh.options import MeshOptions, SliceOptions
 from gensig.mesh.pair_table import node_positions
@@ -25,7 +26,6 @@ from gensig.mesh.sliced.slice_pressure import contact_pressure
 from gensig.mesh.sliced.sliced_table import SlicedTable, sliced_table
 from gensig.mesh.sliced.slices import (
     LoadedContact,
-    Meeting,
     SlicedMesh,
     loaded_contact,
     single_pair_stiffness,
@@ -235,7 +235,7 @@ def _seen(mesh: SlicedMesh) -> tuple[int, int, Meeting, tuple[int, int] | None]:
         if len(odd):
             start[gear], span = int(odd[0]), max(span, int(odd[-1] - odd[0]))
             turn = max(turn, len(side.kind))
-    meeting = Meeting(start_tooth_pinion=start[0], start_tooth_wheel=start[1])
+    meeting = Meeting(start_teeth=(start[0], start[1]))
     if span < 0:
         return 0, 1, meeting, None
     n_periods = math.ceil(mesh.pair.total_contact_ratio) + span + 2 * SOUND_PERIODS

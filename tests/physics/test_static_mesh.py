@@ -7,7 +7,7 @@ import pytest
 from closeness import assert_close
 from fault_cases import GEARS, KINDS, one
 
-from gensig.mesh.load_distribution import PairStates, pair_states, static_mesh
+from gensig.mesh.load_distribution import Meeting, PairStates, pair_states, static_mesh
 
 
 def fault(kind, gear="pinion", tooth=5):
@@ -68,7 +68,7 @@ def violation(states, static, shared, force):
 class TestPairStates:
     @pytest.fixture
     def errors(self, xiamen):
-        """Errors in m and tilts in m/m of all teeth, as arguments of ``pair_states``."""
+        """Errors in m and tilts in m/m of all teeth."""
         rng = np.random.default_rng(4)
         scales = {"error": 5e-6, "tilt": 3e-4}
         return {
@@ -106,9 +106,13 @@ class TestPairStates:
         table, starts = xiamen.mesh_table(faults), {"pinion": 7, "wheel": 40}
         turns = np.random.default_rng(2).uniform(-1.0, 3.0, 300)
         roll = turns * 84 * table.pair.base_pitch
-        first = {f"start_tooth_{side}": tooth for side, tooth in starts.items()}
+        meeting = Meeting(
+            start_teeth=tuple(starts.values()),
+            errors=tuple(errors[f"{side}_error"] for side in starts),
+            tilts=tuple(errors[f"{side}_tilt"] for side in starts),
+        )
 
-        states = pair_states(table, roll, **first, **errors)
+        states = pair_states(table, roll, meeting)
 
         expected = np.array([list(self.plain(table, r, starts, errors)) for r in roll])
         rows = (expected[:, :, 0], 1e-9, 0.0), (expected[:, :, 1], 1e-9, 1e-15)
@@ -123,7 +127,7 @@ class TestPairStates:
         roll = np.zeros(1)
         for n_teeth in (22, 24):
             with pytest.raises(ValueError, match="broadcast"):
-                pair_states(table, roll, pinion_error=np.zeros(n_teeth))
+                pair_states(table, roll, Meeting(errors=(np.zeros(n_teeth), None)))
 
     def test_a_roll_that_is_no_number_reads_nothing(self, table):
         with np.errstate(invalid="ignore"):

@@ -22,9 +22,8 @@ from gensig.dynamics.mesh_state import MeshState
 from gensig.errors import SimulationError
 from gensig.systems.integration_checks import (
     checks,
-    finer,
-    is_too_coarse,
     not_finite,
+    records_by_kind,
 )
 from gensig.systems.run import CleanRecord, Run
 
@@ -52,25 +51,15 @@ def simulate_lines(runs: Sequence[LineRun]) -> list[CleanRecord | SimulationErro
     A record's bits do not depend on the other runs. A motion that does not stay finite, or a
     machine that the core does not cover, gives its error in place of its record.
     """
-    results: dict[int, CleanRecord | SimulationError] = {}
-    machines: dict[int, LineDynamics] = {}
-    kinds: dict[tuple[object, ...], list[int]] = {}
-    for index, run in enumerate(runs):
-        try:
-            machines[index] = dynamics_of(run)
-            check_line(machines[index], run.system.solver, _rate(run))
-        except SimulationError as error:
-            results[index] = error
-        else:
-            kinds.setdefault(_kind(run, machines[index]), []).append(index)
-    for same in kinds.values():
-        records = _together([runs[i] for i in same], [machines[i] for i in same])
-        results.update(zip(same, records, strict=True))
-    coarse = [i for i, record in results.items() if is_too_coarse(runs[i], record)]
-    if coarse:
-        again = simulate_lines([finer(runs[i]) for i in coarse])
-        results.update(zip(coarse, again, strict=True))
-    return [results[index] for index in range(len(runs))]
+    return records_by_kind(
+        runs, dynamics_of=_checked_dynamics, kind_of=_kind, integrate=_together
+    )
+
+
+def _checked_dynamics(run: LineRun) -> LineDynamics:
+    line = dynamics_of(run)
+    check_line(line, run.system.solver, _rate(run))
+    return line
 
 
 def dynamics_of(run: LineRun) -> LineDynamics:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.mesh.load_distribution import StaticMesh, cells
+from gensig.mesh.load_distribution import PERFECT, Meeting, StaticMesh, cells
 from gensig.mesh.sliced.sliced_table import SlicedTable
 
 Array = NDArray[np.float64]
@@ -30,21 +30,11 @@ class ChordStates:
 
 
 def chord_states(
-    table: SlicedTable,
-    roll: Array,
-    *,
-    start_tooth_pinion: int = 0,
-    start_tooth_wheel: int = 0,
-    pinion_error: Array | None = None,
-    wheel_error: Array | None = None,
-    pinion_tilt: Array | None = None,
-    wheel_tilt: Array | None = None,
+    table: SlicedTable, roll: Array, meeting: Meeting = PERFECT
 ) -> ChordStates:
-    """Pairs at the pinion's roll, (phase,) m along the line of action; at 0 the start teeth enter
-    at A.
+    """Pairs at the pinion's roll, (phase,) m along the line of action.
 
-    Errors and tilts of the teeth as in ``load_distribution.pair_states``, for the middle of the
-    face.
+    Errors and tilts of the teeth are those of the middle of the face.
     """
     pair, pitch = table.pair, table.pair.base_pitch
     index = np.floor(roll / pitch).astype(np.int64)[:, None] - table.first_pitch
@@ -54,14 +44,12 @@ def chord_states(
     part = part[:, :, None]
     middle_lag = 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
     beyond = position - pair.pitch_point - middle_lag
-    pinion = (index + start_tooth_pinion) % pair.pinion.n_teeth
-    wheel = (index + start_tooth_wheel) % pair.wheel.n_teeth
+    pinion = (index + meeting.start_teeth[0]) % pair.pinion.n_teeth
+    wheel = (index + meeting.start_teeth[1]) % pair.wheel.n_teeth
     kinds = table.pinion_kind[pinion], table.wheel_kind[wheel]
     back = np.zeros(position.shape)
-    for teeth, error, tilt in (
-        (pinion, pinion_error, pinion_tilt),
-        (wheel, wheel_error, wheel_tilt),
-    ):
+    gears = zip((pinion, wheel), meeting.errors, meeting.tilts, strict=True)
+    for teeth, error, tilt in gears:
         if error is not None:
             back += error[teeth]
         if tilt is not None:

@@ -17,6 +17,7 @@ from gensig.errors import ConfigError, ExtrapolationError, GeometryError
 from gensig.geometry.contact import GearPair, corner_gap_by_pinion
 from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.material import Material
+from gensig.mesh.load_distribution import PERFECT, Meeting
 from gensig.mesh.local_contact import contact_law
 from gensig.mesh.options import MeshOptions, SliceOptions
 from gensig.mesh.pair_table import (
@@ -228,25 +229,6 @@ def _structure(
     return left[inverse], shared
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Meeting:
-    """Start teeth of a mesh, and the errors of single teeth.
-
-    Parameters
-    ----------
-    start_tooth_pinion, start_tooth_wheel : the teeth whose first slices enter at A at roll 0
-    pinion_error, wheel_error : (tooth,) m      gap at the pitch point
-    pinion_tilt, wheel_tilt : (tooth,) m/m      growth of the gap with the position along the path
-    """
-
-    start_tooth_pinion: int = 0
-    start_tooth_wheel: int = 0
-    pinion_error: Array | None = None
-    wheel_error: Array | None = None
-    pinion_tilt: Array | None = None
-    wheel_tilt: Array | None = None
-
-
 def pair_positions(mesh: SlicedMesh, roll: Array) -> tuple[Array, NDArray[np.int64]]:
     """Positions s of every pair's slices, (phase, pair, slice) m, and pair numbers, (phase, pair).
 
@@ -284,7 +266,7 @@ class ContactPhases:
 
 
 def contact_phases(
-    mesh: SlicedMesh, roll: Array, meeting: Meeting | None = None
+    mesh: SlicedMesh, roll: Array, meeting: Meeting = PERFECT
 ) -> ContactPhases:
     """Prepare the loaded contact at rolls, (phase,) m.
 
@@ -296,7 +278,7 @@ def contact_phases(
         position, share = cut_by_field(mesh, position)
     structure = np.interp(position, mesh.position, mesh.structure)
     gap = _gaps(mesh, position)
-    _add_teeth(mesh, position, index, meeting or Meeting(), structure, gap)
+    _add_teeth(mesh, position, index, meeting, structure, gap)
     return ContactPhases(
         mesh=mesh,
         roll=roll,
@@ -310,7 +292,7 @@ def contact_phases(
 
 
 def loaded_contact(
-    mesh: SlicedMesh, roll: Array, force: float, meeting: Meeting | None = None
+    mesh: SlicedMesh, roll: Array, force: float, meeting: Meeting = PERFECT
 ) -> LoadedContact:
     """Load of every slice of every pair under a total force along the transverse line of action.
 
@@ -388,10 +370,9 @@ def _add_teeth(
     gap: Array,
 ) -> None:
     """Add the contributions of single teeth to structure and gap, (phase, pair, slice)."""
-    for name, side in mesh.sides.items():
-        start = getattr(meeting, f"start_tooth_{name}")
-        error = getattr(meeting, f"{name}_error")
-        tilt = getattr(meeting, f"{name}_tilt")
+    sides = mesh.sides.values()
+    teeth = zip(sides, meeting.start_teeth, meeting.errors, meeting.tilts, strict=True)
+    for side, start, error, tilt in teeth:
         tooth = (index + start) % len(side.kind)
         kinds = side.kind[tooth]
         for kind in np.unique(kinds[kinds > 0]):

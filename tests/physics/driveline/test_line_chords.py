@@ -24,6 +24,7 @@ from gensig.driveline.time.toothed_mesh import toothed_mesh
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.errors import ConfigError
 from gensig.faults.broken import MissingTooth
+from gensig.mesh.load_distribution import Meeting
 from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_sliced_pair
@@ -70,16 +71,10 @@ class TestLaw:
         """
         table, force = helical
         rolls = np.linspace(0.05, 30.05, 61)
-        errors = dict(
-            zip(
-                ("pinion_error", "wheel_error"),
-                mesh.errors,
-                strict=True,
-            )
-        )
+        meeting = Meeting(errors=mesh.errors)
         computed = chord_equilibrium(
             table,
-            chord_states(table, rolls * table.pair.base_pitch, **errors),
+            chord_states(table, rolls * table.pair.base_pitch, meeting),
             share * force,
         )
         forces = [

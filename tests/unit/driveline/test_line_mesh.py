@@ -17,7 +17,7 @@ from gensig.driveline.time.toothed_mesh import toothed_mesh
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.errors import ConfigError, GeometryError
 from gensig.faults.broken import MissingTooth
-from gensig.mesh.load_distribution import pair_states, static_mesh
+from gensig.mesh.load_distribution import Meeting, pair_states, static_mesh
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_sliced_pair
 
@@ -177,12 +177,9 @@ class TestPairs:
         """Every pair with its own teeth, the missing one too, and the shared body."""
         rolls = np.linspace(0.05, 30.05, 61)
         pitch = table.pair.base_pitch
-        errors = dict(zip(("pinion_error", "wheel_error"), pairs.errors, strict=True))
-        for name, tilt in zip(("pinion_tilt", "wheel_tilt"), pairs.tilts, strict=True):
-            errors[name] = tilt / pitch
-        computed = static_mesh(
-            table, pair_states(table, rolls * pitch, **errors), 500.0
-        )
+        tilts = tuple(tilt / pitch for tilt in pairs.tilts)
+        meeting = Meeting(errors=pairs.errors, tilts=tilts)
+        computed = static_mesh(table, pair_states(table, rolls * pitch, meeting), 500.0)
         for turned, approach, load in zip(
             rolls, computed.approach, computed.load, strict=True
         ):

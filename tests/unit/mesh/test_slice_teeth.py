@@ -12,12 +12,14 @@ from gensig.errors import ConfigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import read_faults
 from gensig.mesh.load_distribution import (
+    PERFECT,
+    Meeting,
     loaded_pair_table,
     pair_states,
     static_mesh,
 )
 from gensig.mesh.sliced.slice_teeth import merged_edges
-from gensig.mesh.sliced.slices import Meeting, loaded_contact
+from gensig.mesh.sliced.slices import loaded_contact
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_sliced_pair
 
@@ -33,7 +35,7 @@ def case(*typed):
 
 
 @functools.cache
-def approach_of(*words, n_periods=9, meeting=None):
+def approach_of(*words, n_periods=9, meeting=PERFECT):
     """Pair, its faulty teeth, rolls from the third period before the fault on, and approach."""
     system, faults = case(*words)
     teeth = faulty_teeth(system.pair, faults)
@@ -43,7 +45,7 @@ def approach_of(*words, n_periods=9, meeting=None):
     return system, teeth, roll, contact.approach
 
 
-def spur_approach(system, teeth, roll, **meeting):
+def spur_approach(system, teeth, roll, meeting=PERFECT):
     """Approach of the spur pair's table."""
     force = system.mesh_force
     table = loaded_pair_table(
@@ -53,7 +55,7 @@ def spur_approach(system, teeth, roll, **meeting):
         teeth,
         force=force,
     )
-    return static_mesh(table, pair_states(table, roll, **meeting), force).approach
+    return static_mesh(table, pair_states(table, roll, meeting), force).approach
 
 
 @pytest.mark.parametrize(
@@ -100,18 +102,13 @@ def test_errors_of_single_teeth_are_those_of_the_spur_pair():
     """Pitch errors and tilts of every tooth, and other start teeth."""
     system, _ = case(*SPUR)
     rng = np.random.default_rng(1)
-    meeting = {
-        "start_tooth_pinion": 5,
-        "start_tooth_wheel": 11,
-        "pinion_error": rng.uniform(-5e-6, 5e-6, 23),
-        "wheel_error": rng.uniform(-5e-6, 5e-6, 84),
-        "pinion_tilt": rng.uniform(-3e-4, 3e-4, 23),
-        "wheel_tilt": rng.uniform(-3e-4, 3e-4, 84),
-    }
-    _, teeth, roll, approach = approach_of(
-        *SPUR, n_periods=30, meeting=Meeting(**meeting)
+    meeting = Meeting(
+        start_teeth=(5, 11),
+        errors=(rng.uniform(-5e-6, 5e-6, 23), rng.uniform(-5e-6, 5e-6, 84)),
+        tilts=(rng.uniform(-3e-4, 3e-4, 23), rng.uniform(-3e-4, 3e-4, 84)),
     )
-    exact = spur_approach(system, teeth, roll, **meeting)
+    _, teeth, roll, approach = approach_of(*SPUR, n_periods=30, meeting=meeting)
+    exact = spur_approach(system, teeth, roll, meeting)
 
     assert_close(approach, exact, 1e-3)
     assert np.ptp(exact) > 5e-6

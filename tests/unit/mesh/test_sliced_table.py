@@ -13,6 +13,8 @@ from gensig.errors import FaultError
 from gensig.faults.registry import read_faults
 from gensig.mesh import pair_table
 from gensig.mesh.load_distribution import (
+    PERFECT,
+    Meeting,
     loaded_pair_table,
     pair_states,
     static_mesh,
@@ -21,7 +23,6 @@ from gensig.mesh.sliced import sliced_table
 from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
 from gensig.mesh.sliced.sliced_table import DEEPEST, N_CHORDS
 from gensig.mesh.sliced.slices import (
-    Meeting,
     loaded_contact,
     single_pair_stiffness,
 )
@@ -40,9 +41,9 @@ def faults_of(*words):
     return read_faults(read_request(["system=helical_pair", *words]).config["fault"])
 
 
-def at_rest(table, roll, force, **errors):
+def at_rest(table, roll, force, meeting=PERFECT):
     """Approach and load (phase, pair) of the chords under a total force."""
-    static = chord_equilibrium(table, chord_states(table, roll, **errors), force)
+    static = chord_equilibrium(table, chord_states(table, roll, meeting), force)
     return static.approach, static.load
 
 
@@ -154,16 +155,15 @@ def test_errors_of_single_teeth_open_all_chords():
     """Pitch errors and tilts of a grade 5 gear; the table takes tilts at mid-face."""
     system, table, mesh = table_of()
     rng = np.random.default_rng(2)
-    errors = {
-        f"{side}_{kind}": rng.uniform(-most, most, n)
-        for side, n in (("pinion", 61), ("wheel", 132))
-        for kind, most in (("error", 2e-6), ("tilt", 1e-4))
-    }
+    errors, tilts = (
+        tuple(rng.uniform(-most, most, n) for n in (61, 132)) for most in (2e-6, 1e-4)
+    )
+    meeting = Meeting(errors=errors, tilts=tilts)
     roll = system.phases(16, n_periods=20)
     force = system.mesh_force
 
-    exact = loaded_contact(mesh, roll, force, Meeting(**errors)).approach
-    result, _ = at_rest(table, roll, force, **errors)
+    exact = loaded_contact(mesh, roll, force, meeting).approach
+    result, _ = at_rest(table, roll, force, meeting)
 
     assert_close(result, exact, 5e-3)
     assert np.ptp(exact) > 1e-6

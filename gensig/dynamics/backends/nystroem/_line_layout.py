@@ -123,23 +123,8 @@ class ChordLineGroup(LineGroup):
     """
 
 
-class Mesh(NamedTuple):
-    """One mesh of a ``LineGroup``, for the functions that know one mesh."""
-
-    numbers: Any
-    exact: Any
-    indices: Any
-    table: Any
-    bend: Any
-    tooth_row: Any
-    tooth_error: Any
-    tooth_tilt: Any
-    one_sided: bool
-    consistent: bool
-
-
-class ChordMeshFields(NamedTuple):
-    """Fields of a ``ChordMesh``."""
+class MeshFields(NamedTuple):
+    """Fields of one mesh of a ``LineGroup``."""
 
     numbers: Any
     exact: Any
@@ -157,7 +142,11 @@ class ChordMeshFields(NamedTuple):
     consistent: bool
 
 
-class ChordMesh(ChordMeshFields, Helical):
+class Mesh(MeshFields):
+    """One mesh of a ``LineGroup``, for the functions that know one mesh."""
+
+
+class ChordMesh(MeshFields, Helical):
     """One mesh of a ``ChordLineGroup``, for the functions that know one mesh."""
 
 
@@ -170,24 +159,17 @@ def of(name, d):
 @written
 def mesh_of(group, m, n):
     """Mesh ``m`` of a group of ``n`` lanes; views, not copies."""
-    return Mesh(
-        tail(group.numbers, m * (layout.N_NUMBERS * n)),
-        tail(group.exact, m * (layout.N_EXACT * n)),
-        tail(group.indices, m * (layout.N_INDICES * n)),
-        group.table,
-        tail(group.bend, m * (COLUMNS * n)),
-        group.tooth_row,
-        group.tooth_error,
-        group.tooth_tilt,
-        group.one_sided,
-        group.consistent,
-    )
+    return Mesh(*_fields_of(group, m, n))
 
 
 @written
 def chord_mesh_of(group, m, n):
     """Mesh ``m`` of a group whose meshes have chords; views, not copies."""
-    return ChordMesh(
+    return ChordMesh(*_fields_of(group, m, n))
+
+
+def _fields_of(group, m, n):
+    return (
         tail(group.numbers, m * (layout.N_NUMBERS * n)),
         tail(group.exact, m * (layout.N_EXACT * n)),
         tail(group.indices, m * (layout.N_INDICES * n)),
