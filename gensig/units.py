@@ -157,7 +157,7 @@ def _kept(
     items: tuple[tuple[str, Any], ...],
     kinds: tuple[type, ...],
 ) -> T:
-    """What was read of equal keys: the machines of a plan differ in a few of them.
+    """The dataclass of equal keys, read once: machines of a plan differ in a few keys.
 
     ``kinds`` are types of the values: true is equal to 1.
     """
@@ -293,10 +293,10 @@ def _keys(cls: type) -> dict[str, _Key]:
         kinds = (hint,)
         if isinstance(hint, types.UnionType):
             kinds = typing.get_args(hint)
-        default = field.default
-        if field.default_factory is not dataclasses.MISSING:
-            default = field.default_factory
-        is_required = default is dataclasses.MISSING
+        is_required = (
+            field.default is dataclasses.MISSING
+            and field.default_factory is dataclasses.MISSING
+        )
         keys[name] = _Key(field, kinds, to_si(name, 1.0), is_required)
     return keys
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from gensig.driveline.shaft_tables import (
     read_gears,
     read_shafting,
     shipped_tables,
+    text_of,
 )
 from gensig.driveline.table_rows import (
     check_gears_in_mesh,
@@ -132,7 +134,18 @@ def read_drive_line(config: Configuration) -> DriveLine:
             "writes both) or two of "
             f"{', '.join(shipped_tables())}"
         )
+    files = ("shafting_csv", options.shafting_csv), ("gears_csv", options.gears_csv)
+    texts = [text_of(f"system.{key}", file) for key, file in files if file is not None]
     material = read_material(config.section("material"))
+    return _line_of_tables(options, material, tuple(texts))
+
+
+@lru_cache(maxsize=16)
+def _line_of_tables(
+    options: LineOptions, material: Material, texts: tuple[str, ...]
+) -> DriveLine:
+    """The line of options and their files, which are read anew when their ``texts`` change."""
+    assert options.shafting_csv is not None
     shafting = read_shafting("system.shafting_csv", options.shafting_csv)
     gear_rows = []
     if options.gears_csv is not None:

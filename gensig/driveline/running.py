@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -139,14 +140,6 @@ class RunningLine:
             [reference_force(self.machine, m, force) for m, force in forces]
         )
 
-    def touched(self, mesh: int) -> list[int]:
-        """Degrees of freedom of x, y and rotation of both gears of a mesh; -1: does not move so."""
-        return _touched(self.machine, self.matrices, mesh)
-
-    def sense(self, mesh: int) -> float:
-        """1 where the driving gear of a mesh turns from x to y, else -1."""
-        return _sense(self.machine, mesh)
-
     def dof(self, node: int) -> int:
         """Index of the degree of freedom that a node, by its number, turns with."""
         return _dof(self.matrices, self.machine.drive.numbers.index(node))
@@ -249,6 +242,7 @@ def mesh_forces(machine: EngineLine, speed: float, torque: float) -> Array:
     return response.element_forces(elements)[0]
 
 
+@lru_cache(maxsize=64)
 def named_by_side(pair: GearPair) -> GearPair:
     """The pair with its gears named by their sides, as faults and mesh tables name them."""
     pinion, wheel = (replace(gear, name=side) for side, gear in pair.gears.items())
@@ -344,14 +338,14 @@ def _mesh(
     friction = mesh_friction(
         teeth.table,
         matrices.directions[number],
-        _touched(machine, matrices, number),
+        touched_dofs(machine, matrices, number),
         matrices.rigid[0],
-        _sense(machine, number),
+        turning_sense(machine, number),
     )
     return toothed_mesh(teeth=teeth, friction=friction, **common)
 
 
-def _touched(machine: EngineLine, matrices: LineMatrices, number: int) -> list[int]:
+def touched_dofs(machine: EngineLine, matrices: LineMatrices, number: int) -> list[int]:
     """Degrees of freedom of x, y and rotation of both gears of a mesh; -1: does not move so."""
     line, dofs = machine.drive.line, []
     mesh = line.meshes[number]
@@ -365,7 +359,7 @@ def _touched(machine: EngineLine, matrices: LineMatrices, number: int) -> list[i
     return dofs
 
 
-def _sense(machine: EngineLine, number: int) -> float:
+def turning_sense(machine: EngineLine, number: int) -> float:
     """1 where the driving gear of a mesh turns from x to y, else -1."""
     line = machine.drive.line
     gear = line.gears[line.meshes[number].driving]

@@ -154,7 +154,7 @@ def _tables() -> resources.abc.Traversable:  # type: ignore[name-defined]
     return resources.files("gensig.configs").joinpath("tables")
 
 
-def _text_of(key: str, file: str) -> str:
+def text_of(key: str, file: str) -> str:
     """Text of a file: a bare name is one of the shipped tables, anything else a path."""
     bare = file.removesuffix(".csv") + ".csv"
     if bare in shipped_tables():
@@ -177,7 +177,7 @@ def _read(
     table = f"{key} = {file}"
     lines = [
         (number, line)
-        for number, line in enumerate(_text_of(key, file).splitlines(), start=1)
+        for number, line in enumerate(text_of(key, file).splitlines(), start=1)
         if line.strip(" ,\t") and not line.lstrip().startswith("#")
     ]
     if not lines:

@@ -96,11 +96,6 @@ class MeshLanes:
             tooth_tilt=np.concatenate([t for mesh in meshes for t in mesh.tilts]),
         )
 
-    @property
-    def n_values(self) -> int:
-        """Numbers of the tables of all lanes."""
-        return sum(math.prod(each.values.shape[:3]) * COLUMNS for each in self.rows)
-
     def table(self) -> list[Array]:
         """Values of ``Group.table``, lane after lane."""
         return [each.values[..., :COLUMNS].ravel() for each in self.rows]

@@ -282,3 +282,29 @@ def test_a_kind_is_read_by_its_name(values, text):
 def test_an_error_without_its_group_gets_a_name(text, named):
     with pytest.raises(ConfigError, match=f"^{named}$"), naming("gear.part: "):
         raise ConfigError(text)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Switch:
+    share: float
+    is_on: bool = False
+    seats: tuple[float, ...] = unit("mm", default=())
+
+
+def test_equal_keys_are_read_once():
+    """Of lists, which have no hash, the values are equal all the same."""
+    first, again = (read(Switch, {"share": 0.5}, "switch") for _ in range(2))
+    assert again is first
+    assert read(Switch, {"share": 0.6}, "switch") != first
+    seats = {"share": 0.5, "seats_mm": [1, 2]}
+    assert read(Switch, seats, "switch") == read(Switch, seats, "switch") != first
+
+
+def test_true_is_not_the_one_that_was_read_before():
+    """They are equal in Python: neither passes for the other."""
+    assert read(Switch, {"share": 1}, "switch").share == 1.0
+    with refused("switch.share = True is not a number"):
+        read(Switch, {"share": True}, "switch")
+    assert read(Switch, {"share": 1, "is_on": True}, "switch").is_on
+    with refused("switch.is_on = 1 is not true or false"):
+        read(Switch, {"share": 1, "is_on": 1}, "switch")

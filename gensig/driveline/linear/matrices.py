@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +68,7 @@ class LineMatrices:
         return 1.0 / np.sum(self.directions**2 / np.diag(self.mass), axis=1)
 
 
+@lru_cache(maxsize=32)
 def line_matrices(
     line: ShaftLine, *, merge_rigid: bool = True, lateral: bool = False
 ) -> LineMatrices:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -24,6 +25,7 @@ class _Joint:
         return f"{self.ends[0]} - {self.ends[1]} with {self.stiffness:.3g} N m/rad"
 
 
+@lru_cache(maxsize=16)
 def check_stiffness_range(drive: DriveLine) -> None:
     """Raise for joints so unlike in stiffness that rounding hides the softer ones.
 

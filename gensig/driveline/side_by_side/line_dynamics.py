@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.driveline.running import RunningLine
+from gensig.driveline.running import RunningLine, touched_dofs, turning_sense
 from gensig.driveline.side_by_side.line_statics import line_at_rest
 from gensig.driveline.time.course import ShaftTorque
 from gensig.driveline.time.mesh_friction import slide_direction
@@ -199,8 +199,10 @@ def line_dynamics(running: RunningLine, *, angles: Sequence[int]) -> LineDynamic
     return LineDynamics(
         running=running,
         teeth=tuple(_teeth(running, m) for m in meshes),
-        touched=np.array([running.touched(m) for m in meshes], dtype=np.int64),
-        senses=np.array([running.sense(m) for m in meshes]),
+        touched=np.array(
+            [touched_dofs(running.machine, running.matrices, m) for m in meshes]
+        ),
+        senses=np.array([turning_sense(running.machine, m) for m in meshes]),
         angles=tuple(running.dof(node) for node in angles),
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -68,14 +69,14 @@ def _meshes(
     """Fields of the group that are of meshes and their teeth."""
     first = lanes[0]
     meshes = [_mesh_lanes(lanes, m, rests) for m in range(len(first.teeth))]
-    values = np.cumsum([0, *[mesh.n_values for mesh in meshes]]).tolist()
+    tables = [mesh.table() for mesh in meshes]
+    values = np.cumsum([0, *[sum(map(len, table)) for table in tables]]).tolist()
     teeth = np.cumsum([0, *[len(mesh.tooth_row) for mesh in meshes]]).tolist()
     indices = []
     for mesh, n_values, n_teeth in zip(meshes, values, teeth, strict=False):
         mesh.indices[:, [layout.TABLE, layout.COAST_TABLE]] += n_values
         mesh.indices[:, [layout.PINION_TOOTH, layout.WHEEL_TOOTH]] += n_teeth
         indices.append(mesh.indices.T.ravel())
-    table = [values for mesh in meshes for values in mesh.table()]
     chords = [_chord_columns(rows).ravel() for mesh in meshes for rows in mesh.rows]
 
     def joined(name: str) -> NDArray[Any]:
@@ -93,7 +94,9 @@ def _meshes(
         "indices": np.concatenate(indices),
         "n_pairs": max(int(mesh.indices[:, layout.FOLLOWED].max()) for mesh in meshes),
         "n_chords": n_chords,
-        "table": np.concatenate([*table, missing_cells()], dtype=np.dtype(precision)),
+        "table": np.concatenate(
+            [*chain(*tables), missing_cells()], dtype=np.dtype(precision)
+        ),
         "depth": depth.astype(precision).ravel(),
         "chord_table": np.concatenate(chords, dtype=np.dtype(precision)),
         "bend": joined("bend").astype(precision),

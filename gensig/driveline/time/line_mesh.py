@@ -163,8 +163,7 @@ def even_mesh(
 ) -> LineMesh:
     """A mesh of one stiffness in N/m wherever it has rolled, whose teeth are all alike."""
     row = np.zeros((1, 1), dtype=np.int64)
-    alike = tuple(np.zeros(n, dtype=np.int64) for n in n_teeth)
-    perfect = tuple(np.zeros(n) for n in n_teeth)
+    perfect = np.zeros(n_teeth[0]), np.zeros(n_teeth[1])
     return LineMesh(
         name=name,
         direction=direction,
@@ -173,9 +172,9 @@ def even_mesh(
         gap=np.zeros((1, 2)),
         rows=row,
         coast_rows=row,
-        kinds=(alike[0], alike[1]),
-        errors=(perfect[0], perfect[1]),
-        tilts=(perfect[0], perfect[1]),
+        kinds=(perfect[0].astype(np.int64), perfect[1].astype(np.int64)),
+        errors=perfect,
+        tilts=perfect,
         upright=0.0,
         n_pairs=1,
         first_pitch=0,

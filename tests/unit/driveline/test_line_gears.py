@@ -21,6 +21,14 @@ def drive():
     return read_drive_line(read_request(["system=two_stage_gearbox"]).config)
 
 
+def test_a_line_is_built_once_for_equal_tables(drive):
+    """A data set reads it for every condition; other materials make another."""
+    config = read_request(["system=two_stage_gearbox"]).config
+    assert read_drive_line(config) is drive
+    lighter = read_drive_line(config.with_values({"material.density_kg_per_m3": 7000}))
+    assert lighter.line.nodes != drive.line.nodes
+
+
 def named(drive, *names):
     gears = tuple(
         replace(gear, name=name)
