@@ -145,6 +145,22 @@ def test_a_torque_ripple_moves_the_gears_as_the_linear_line():
     assert abs(found / expected - 1.0) < 0.05
 
 
+def test_torques_over_an_angle_know_no_neighbours_and_no_precision():
+    """Machines of other torques and speeds side by side, each as alone, and in float32."""
+    machine = read_line_machine(read_request([*TWO_STAGE, RIPPLE]).config)
+    slower = replace(
+        machine, operating=replace(machine.operating, speed=90.0, torque=20.0)
+    )
+    runs = [run_of(machine), run_of(slower), run_of(machine, MISSING)]
+    together = recorded(*runs)
+    for run, record in zip(runs, together, strict=True):
+        (alone,) = recorded(run)
+        assert alone.acceleration.tobytes() == record.acceleration.tobytes()
+    (single,) = recorded(run_of(with_solver(machine, precision="float32")))
+    double = together[0].acceleration[None]
+    assert in_band_error(single.acceleration[None], double, RATE)[0] < 1e-3
+
+
 def test_an_engine_moves_as_by_the_implicit_method():
     """Gas, mass and cam torques over the crank angle, losses by mode.
 

@@ -10,6 +10,7 @@ from gensig.dynamics._vector import (
     any_above,
     at,
     cells,
+    compiled,
     get_row,
     inlined,
     joined,
@@ -101,7 +102,7 @@ def _in_row(exact, row, work):
     return joined(work, low, high)
 
 
-@inlined
+@compiled
 def drive(group, begin, since, q, machine, wide):
     """Add the torques that follow an angle to the rows ``ON``, ``since`` s after a step's begin.
 

@@ -141,9 +141,11 @@ def line_integrator(
                 moved, rate = to_middle(d * lines.N_BLOCKS, step, 1, machine)
                 own_pull(group, d, moved, rate, machine)
             couple(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
-            damp(group, rows.MIDDLE_V, machine)
+            if len(group.damper_other) > 0:
+                damp(group, rows.MIDDLE_V, machine)
             govern(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
-            drive(group, number * step, 0.5 * step, rows.MIDDLE_Q, machine, wide)
+            if len(group.sources) > 0:
+                drive(group, number * step, 0.5 * step, rows.MIDDLE_Q, machine, wide)
             for m in range(n_meshes):
                 push_middle(group, m, step, machine, work, wide, near)
             for d in range(n_dof):
@@ -151,9 +153,11 @@ def line_integrator(
                 moved, rate = predict(d * lines.N_BLOCKS, a, step, 1, machine)
                 own_pull(group, d, moved, rate, machine)
             couple(group, rows.END_Q, rows.END_V, machine)
-            damp(group, rows.END_V, machine)
+            if len(group.damper_other) > 0:
+                damp(group, rows.END_V, machine)
             govern(group, rows.END_Q, rows.END_V, machine)
-            drive(group, number * step, step, rows.END_Q, machine, wide)
+            if len(group.sources) > 0:
+                drive(group, number * step, step, rows.END_Q, machine, wide)
             for m in range(n_meshes):
                 push_end(group, m, next_slot, step, machine, work, wide, near)
             for d in range(n_dof):
@@ -281,9 +285,11 @@ def pull_at_begin(group, time, machine, wide):
         moved, rate = get_row(machine, of(q, d)), get_row(machine, of(v, d))
         own_pull(group, d, moved, rate, machine)
     couple(group, q, v, machine)
-    damp(group, v, machine)
+    if len(group.damper_other) > 0:
+        damp(group, v, machine)
     govern(group, q, v, machine)
-    drive(group, time, 0.0, q, machine, wide)
+    if len(group.sources) > 0:
+        drive(group, time, 0.0, q, machine, wide)
 
 
 @inlined

@@ -201,7 +201,7 @@ def _couple(group, k, a, b, q, v, machine):
         set_row(machine, pulled, get_row(machine, pulled) - spring)
 
 
-@inlined
+@compiled
 def damp(group, rates, machine):
     """Add the forces of dampers between degrees of freedom that no spring joins.
 
