@@ -144,8 +144,9 @@ def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T
     if given:
         return _filled(cls, values, where, given)
     try:
-        kinds = tuple(map(type, values.values()))
-        return _kept(cls, where, tuple(values.items()), kinds)  # type: ignore[arg-type, return-value]
+        items, kinds = tuple(values.items()), tuple(map(type, values.values()))
+        kept: T = _kept(cls, where, items, kinds)  # type: ignore[arg-type, assignment]
+        return kept
     except TypeError:  # a list has no hash
         return _filled(cls, values, where, given)
 
