@@ -72,7 +72,7 @@ class LineMatrices:
 def line_matrices(
     line: ShaftLine, *, merge_rigid: bool = True, lateral: bool = False
 ) -> LineMatrices:
-    """Matrices of a line.
+    """Matrices of a line, the same object for equal lines: its arrays must not be changed.
 
     Rigid compounds are one disc each, or the stiff springs that they are given as.
 
