@@ -17,8 +17,9 @@ from collections.abc import Sequence
 from benchmarks import _end_to_end, _rates
 from benchmarks._measure import begin, print_figures, write_json
 from benchmarks._ross_time import stored_rate
-from gensig.driveline.side_by_side.line_integration import line_core
 from gensig.dynamics._vector import LANES, PRECISIONS, n_lanes
+from gensig.dynamics.backends.nystroem.machine_lanes import group_kind
+from gensig.dynamics.backends.nystroem.method import core_of
 
 RECORD = "import gensig; gensig.load_system('solver.precision={}').simulate()"
 PER_CORE = "simulated s per core-s"
@@ -58,7 +59,7 @@ def kernels(runs: int, precisions: Sequence[str] = PRECISIONS) -> dict[str, floa
     if "float32" in precisions:
         works[KERNEL.format("float32")] = _rates.kernel(lanes, 5, "float32")
     boxes = _rates.two_stage_boxes()
-    core = line_core(boxes[0])
+    core = core_of(group_kind(boxes[0].equations))
     for precision in precisions:
         machines = boxes[: n_lanes(precision)]
         works[TWO_STAGE.format(precision)] = _rates.kernel(machines, 5, precision, core)

@@ -9,17 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import final
 
-import numpy as np
-
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._equations import (
-    P_TURN,
-    accelerate,
-    motion,
-    own_turn,
-    set_out,
-)
-from gensig.dynamics._layout import AHEAD, BASE, EVEN, ROLL, Group, HelicalGroup
+from gensig.dynamics._layout import AHEAD, BASE, EVEN, ROLL, is_helical
 from gensig.dynamics._mesh_kernels import mesh_law
 from gensig.dynamics._record_kernels import integrates
 from gensig.dynamics._slots import near_pairs, write_mesh
@@ -38,8 +29,36 @@ from gensig.dynamics._vector import (
 from gensig.dynamics.backends.base import Backend, Integration, Motions
 from gensig.dynamics.backends.group_motions import integrate_machines
 from gensig.dynamics.backends.group_run import Core
-from gensig.dynamics.backends.step_limits import settling_time
-from gensig.dynamics.lanes import pack
+from gensig.dynamics.backends.nystroem import _layout as rows
+from gensig.dynamics.backends.nystroem import machine_lanes
+from gensig.dynamics.backends.nystroem._course import set_forces, set_rolls
+from gensig.dynamics.backends.nystroem._flat import number_at
+from gensig.dynamics.backends.nystroem._group import (
+    AnyLawPairGroup,
+    ChordGroup,
+    HelicalPairGroup,
+    SpurGroup,
+    SpurPairGroup,
+    integer_rows,
+    machine_rows,
+    mesh_of,
+    mesh_rows,
+    of,
+    scratch,
+    wide_rows,
+)
+from gensig.dynamics.backends.nystroem._kernels import write_angles
+from gensig.dynamics.backends.nystroem._meshes import (
+    acceleration,
+    couple,
+    damp,
+    govern,
+    motion,
+    own_pull,
+    push,
+    turning_speed,
+)
+from gensig.dynamics.equations import Dynamics
 from gensig.dynamics.pair import PairDynamics
 
 UNLIMITED = 1e30  # N s/m: no damper of a pair is limited
@@ -50,37 +69,35 @@ WEIGHTS = 1.0, 2.0, 2.0, 1.0
 N_STAGES = 4
 SETTLING = 16  # steps a sample of the settling
 
-# rows behind those of the mesh: the law at a stage, the drive, and a row a degree of freedom each:
-# state at the begin of the step and at a stage, q and then v, accelerations, sums, other forces
-LAW = layout.N_MESH
-DRIVE = LAW + layout.N_LAW
-MACHINE = DRIVE + layout.N_DRIVE
-BEGIN, STAGE, ACCELERATION, SUM_Q, SUM_V, FORCES, N_BLOCKS = 0, 2, 4, 5, 6, 7, 8
+# rows of a degree of freedom: state at the begin of the step, at a stage, and sums of its changes
+BEGIN, STAGE = (rows.Q, rows.V), (rows.MIDDLE_Q, rows.MIDDLE_V)
+SUMS = (rows.END_Q, rows.END_V)
 
 
 @inlined
-def evaluate(group, approach, rate, roll_rate, rows, work, wide, near):
-    """Write the mesh law at the roll ``wide[BASE]`` to ``rows`` of the scratch."""
+def evaluate(mesh, approach, rate, roll_rate, work, wide, near):
+    """Law of a mesh at the roll ``wide[BASE]``, which the rows ``LAW`` take."""
     n = width(work)
     zero = spread(work, 0.0)
     far = spread(work, 2.0 * layout.FAR)
     for lane in range(n):
         near[at(layout.NEWEST, lane, n)] = layout.NO_PAIR
         wide[at(ROLL + EVEN, lane, n)] = wide[at(BASE, lane, n)]
-    set_row(work, layout.WITHIN, approach if group.one_sided else far)
+    for k in range(layout.MOST_PAIRS):
+        set_row(work, layout.PAIR_FORCE + k, zero)
+    set_row(work, layout.WITHIN, approach if mesh.one_sided else far)
     set_row(work, AHEAD + EVEN, zero)
     set_row(work, layout.TOTAL, zero)
     set_row(work, layout.MOST_DAMPER, spread(work, UNLIMITED))
     set_row(work, layout.FLAGS, spread(work, 1.0))
-    helical = layout.is_helical(group)
     for _ in range(ROUNDS):
-        bent = get_row(group.numbers, layout.SHARED) * get_row(work, layout.TOTAL)
+        bent = get_row(mesh.numbers, layout.SHARED) * get_row(work, layout.TOTAL)
         set_row(work, layout.LOCAL, approach - bent)
-        if not gather(group, EVEN, True, work, wide, near) and helical:
+        if not gather(mesh, EVEN, True, work, wide, near) and is_helical(mesh):
             break
         first, last = near_pairs(EVEN, n, near)
         law = mesh_law(
-            group,
+            mesh,
             first,
             last,
             EVEN,
@@ -93,60 +110,78 @@ def evaluate(group, approach, rate, roll_rate, rows, work, wide, near):
             wide,
         )
         for row in range(layout.N_LAW):
-            set_row(work, rows + row, law[row])
-        if not helical:
+            set_row(work, layout.LAW + row, law[row])
+        if not is_helical(mesh):
             break
+    return layout.Law(
+        get_row(work, layout.LAW),
+        get_row(work, layout.LAW + 1),
+        get_row(work, layout.LAW + 2),
+        get_row(work, layout.LAW + 3),
+        get_row(work, layout.LAW + 4),
+        get_row(work, layout.LAW + 5),
+        get_row(work, layout.LAW + 6),
+        get_row(work, layout.LAW + 7),
+    )
 
 
 @compiled
 def law_at(group, motion, work, wide, near, law_rows):
-    """Every lane's law at one instant, to ``law_rows``.
+    """Every lane's law of the first mesh at one instant, to ``law_rows``.
 
     Rows of ``motion`` are roll, approach, its rate, the rate of the roll.
     """
     n = width(work)
     for lane in range(n):
         wide[at(BASE, lane, n)] = motion[at(0, lane, n)]
-    approach, rate = get_row(motion, 1), get_row(motion, 2)
-    evaluate(group, approach, rate, get_row(motion, 3), LAW, work, wide, near)
-    for row in range(layout.N_LAW):
-        set_row(law_rows, row, get_row(work, LAW + row))
-
-
-@inlined
-def rates(group, time, state, n_dof, work, wide, near):
-    """Write the law and the accelerations of a state at a time."""
-    q, v = state, state + n_dof
-    forces = MACHINE + FORCES * n_dof
-    set_out(group, time, q, DRIVE, forces, work, wide)
-    approach, rate = motion(group, q, v, work)
-    speed = get_row(work, DRIVE + layout.DRIVE_SPEED) + own_turn(group, v, work)
-    roll_rate = get_row(group.numbers, layout.PINION_RADIUS) * speed
-    evaluate(group, approach, rate, roll_rate, LAW, work, wide, near)
-    law = layout.Law(
-        get_row(work, LAW),
-        get_row(work, LAW + 1),
-        get_row(work, LAW + 2),
-        get_row(work, LAW + 3),
-        get_row(work, LAW + 4),
-        get_row(work, LAW + 5),
-        get_row(work, LAW + 6),
-        get_row(work, LAW + 7),
+    approach, rate, roll_rate = (
+        get_row(motion, 1),
+        get_row(motion, 2),
+        get_row(motion, 3),
     )
-    torque = get_row(work, DRIVE + layout.DRIVE_TORQUE)
-    a = MACHINE + ACCELERATION * n_dof
-    accelerate(group, law, q, v, torque, forces, a, work)
+    law = evaluate(mesh_of(group, 0, n), approach, rate, roll_rate, work, wide, near)
+    for row in range(layout.N_LAW):
+        set_row(law_rows, row, law[row])
+
+
+@compiled
+def pull(group, time, machine, work, wide, near):
+    """Set the forces on the state of a stage at a time."""
+    n, (q, v) = width(work), STAGE
+    set_rolls(group, time, q, machine, wide)
+    set_forces(group, time, machine, wide)
+    for d in range(len(group.force) // n):
+        own_pull(
+            group,
+            d,
+            get_row(machine, of(q, d)),
+            get_row(machine, of(v, d)),
+            machine,
+        )
+    couple(group, q, v, machine)
+    damp(group, v, machine)
+    govern(group, q, v, machine)
+    for m in range(group.n_meshes):
+        mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
+        approach, rate = motion(group, m, q, v, machine)
+        speed = turning_speed(group, m, v, spread(work, 0.0), machine)
+        roll_rate = get_row(mesh.numbers, layout.PINION_RADIUS) * speed
+        own_wide, counts = wide_rows(wide, m, n), integer_rows(near, m, n)
+        law = evaluate(mesh, approach, rate, roll_rate, own, own_wide, counts)
+        set_row(own, rows.NORMAL, law.normal)
+        push(group, m, law, machine)
 
 
 @inlined
-def observe(group, begin, row, seen, angle, work, wide, near):
-    """Write the pinion's angle and the state of the mesh at the begin of a step."""
+def observe(group, row, seen, angle, machine, work, wide, near):
+    """Write the angles of a group and the state of its meshes at the begin of a step."""
     n = width(work)
-    for lane in range(n):
-        turned = wide[at(layout.NOMINAL, lane, n)]
-        angle[at(row, lane, n)] = turned + work[at(begin + P_TURN, lane, n)]
+    write_angles(group, angle, row, machine, wide)
     if len(seen) > 0:
-        write_mesh(seen, row, get_row(work, LAW), work, near)
+        for m in range(group.n_meshes):
+            own, counts = mesh_rows(work, m, n), integer_rows(near, m, n)
+            normal = get_row(own, rows.NORMAL)
+            write_mesh(seen, row * group.n_meshes + m, normal, own, counts)
 
 
 @compiled
@@ -172,62 +207,100 @@ def integrate(
     """Advance every lane by some steps; arguments are those of all cores."""
     n = width(work)
     n_dof = len(group.force) // n
+    machine = machine_rows(work, group.n_meshes, n)
     zero, one = spread(work, 0.0), spread(work, 1.0)
-    begin, stage_rows = MACHINE + BEGIN * n_dof, MACHINE + STAGE * n_dof
-    a = MACHINE + ACCELERATION * n_dof
-    sum_q, sum_v = MACHINE + SUM_Q * n_dof, MACHINE + SUM_V * n_dof
-    for i in range(2 * n_dof):
-        set_row(work, begin + i, get_row(state, i))
+    (begin_q, begin_v), (q, v), (sum_q, sum_v) = BEGIN, STAGE, SUMS
+    for d in range(n_dof):
+        set_row(machine, of(begin_q, d), get_row(state, d))
+        set_row(machine, of(begin_v, d), get_row(state, n_dof + d))
     for number in range(first_step, first_step + n_steps):
-        for i in range(2 * n_dof):
-            set_row(work, stage_rows + i, get_row(work, begin + i))
-            set_row(work, sum_q + i, zero)
+        for d in range(n_dof):
+            set_row(machine, of(q, d), get_row(machine, of(begin_q, d)))
+            set_row(machine, of(v, d), get_row(machine, of(begin_v, d)))
+            set_row(machine, of(sum_q, d), zero)
+            set_row(machine, of(sum_v, d), zero)
         gain = zero
         for stage in range(N_STAGES):
             time = (number + NODES[stage]) * step
-            for k in range(layout.MOST_PAIRS):
-                set_row(work, layout.PAIR_FORCE + k, zero)
-            rates(group, time, stage_rows, n_dof, work, wide, near)
+            pull(group, time, machine, work, wide, near)
             if stage == 0:
-                gain = get_row(work, DRIVE + layout.DRIVE_GAIN)
-                normal = get_row(work, LAW)
-                apart = where_above(normal * normal, zero, zero, one)
-                set_row(lost, 0, get_row(lost, 0) + apart)
+                gain = get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
+                for m in range(group.n_meshes):
+                    normal = get_row(mesh_rows(work, m, n), rows.NORMAL)
+                    apart = where_above(normal * normal, zero, zero, one)
+                    set_row(lost, m, get_row(lost, m) + apart)
                 if angle_row >= 0 and number % per_angle == 0:
-                    observe(group, begin, angle_row, seen, angle, work, wide, near)
+                    observe(group, angle_row, seen, angle, machine, work, wide, near)
                     angle_row += 1
             weight = WEIGHTS[stage] / 6.0
             reach = step * NODES[min(stage + 1, N_STAGES - 1)]
             for d in range(n_dof):
-                moved = get_row(work, stage_rows + n_dof + d)
-                gained = get_row(work, a + d)
-                set_row(work, sum_q + d, get_row(work, sum_q + d) + weight * moved)
-                set_row(work, sum_v + d, get_row(work, sum_v + d) + weight * gained)
-                at_q, at_v = get_row(work, begin + d), get_row(work, begin + n_dof + d)
-                set_row(work, stage_rows + d, at_q + reach * moved)
-                set_row(work, stage_rows + n_dof + d, at_v + reach * gained)
-        for d in range(2 * n_dof):
-            moved = step * get_row(work, sum_q + d)
-            set_row(work, begin + d, get_row(work, begin + d) + moved)
+                moved = get_row(machine, of(v, d))
+                gained = acceleration(group, d, machine)
+                total = get_row(machine, of(sum_q, d)) + weight * moved
+                set_row(machine, of(sum_q, d), total)
+                total = get_row(machine, of(sum_v, d)) + weight * gained
+                set_row(machine, of(sum_v, d), total)
+                place = get_row(machine, of(begin_q, d)) + reach * moved
+                set_row(machine, of(q, d), place)
+                rate = get_row(machine, of(begin_v, d)) + reach * gained
+                set_row(machine, of(v, d), rate)
+        for d in range(n_dof):
+            moved = step * get_row(machine, of(sum_q, d))
+            moved = get_row(machine, of(begin_q, d)) + moved
+            set_row(machine, of(begin_q, d), moved)
+            gained = step * get_row(machine, of(sum_v, d))
+            gained = get_row(machine, of(begin_v, d)) + gained
+            set_row(machine, of(begin_v, d), gained)
         if out_row >= 0:
             row = (out_row + number - first_step) * len(channels)
             for c in range(len(channels)):
-                carried = gain * get_row(group.rotation, channels[c])
-                set_row(out, row + c, get_row(work, sum_v + channels[c]) + carried)
-    for i in range(2 * n_dof):
-        set_row(state, i, get_row(work, begin + i))
+                d = number_at(channels, c)
+                carried = gain * get_row(group.rotation, d)
+                set_row(out, row + c, get_row(machine, of(sum_v, d)) + carried)
+    for d in range(n_dof):
+        set_row(state, d, get_row(machine, of(begin_q, d)))
+        set_row(state, n_dof + d, get_row(machine, of(begin_v, d)))
     return angle_row
 
 
-integrates(integrate, Group, HelicalGroup)
+class ClassicalSpurGroup(SpurGroup):
+    """Spur machines, for this scheme."""
 
 
-def scratch(n_dof, n_channels, precision="float64"):
-    """Work rows, float64 rows and integer rows of ``integrate`` and ``law_at``."""
-    n = n_lanes(precision)
-    near = np.zeros((layout.N_COUNTS, n), dtype=np.int64)
-    work = np.zeros((MACHINE + N_BLOCKS * n_dof) * n, dtype=precision)
-    return work, np.zeros(layout.N_WIDE * n), near.ravel()
+class ClassicalChordGroup(ChordGroup):
+    """Machines with chords, for this scheme."""
+
+
+class ClassicalSpurPairGroup(SpurPairGroup):
+    """Spur pairs, for this scheme."""
+
+
+class ClassicalAnyLawPairGroup(AnyLawPairGroup):
+    """Spur pairs of any law, for this scheme."""
+
+
+class ClassicalHelicalPairGroup(HelicalPairGroup):
+    """Helical pairs, for this scheme."""
+
+
+KINDS = {
+    kind.__base__: kind
+    for kind in (
+        ClassicalSpurGroup,
+        ClassicalChordGroup,
+        ClassicalSpurPairGroup,
+        ClassicalAnyLawPairGroup,
+        ClassicalHelicalPairGroup,
+    )
+}
+integrates(integrate, *KINDS.values())
+
+
+def pack(dynamics, step, precision="float64", span=(0.0, 0.0)):
+    """Machines as one group of this scheme."""
+    group = machine_lanes.pack(dynamics, step, precision, span)
+    return KINDS[type(group)](*group)
 
 
 CORE = Core(
@@ -237,7 +310,6 @@ CORE = Core(
     coarsest_oversampling=lambda machine, oversampling, rate: min(
         oversampling, SETTLING
     ),
-    settling_time=settling_time,
 )
 
 
@@ -259,7 +331,7 @@ class Classical(Backend):
         return n_lanes(precision)
 
     def integrate(
-        self, machines: Sequence[PairDynamics], integration: Integration
+        self, machines: Sequence[Dynamics], integration: Integration
     ) -> Motions:
         """Motions of machines that have settled."""
         return integrate_machines(machines, integration, CORE)

@@ -18,10 +18,12 @@ from gensig.driveline.side_by_side.line_dynamics import LineDynamics
 from gensig.driveline.side_by_side.line_records import dynamics_of
 from gensig.dynamics._layout import N_LAW
 from gensig.dynamics._vector import LANES, n_lanes
-from gensig.dynamics.backends.group_run import Core, DynamicsT, GroupRun
+from gensig.dynamics.backends.group_run import Core, GroupRun
+from gensig.dynamics.backends.nystroem.machine_lanes import pack
 from gensig.dynamics.backends.nystroem.method import THREE_PAIRS
 from gensig.dynamics.decimation import decimator, in_band_error
-from gensig.dynamics.lanes import fill_lanes, pack
+from gensig.dynamics.equations import Dynamics
+from gensig.dynamics.lanes import fill_lanes
 from gensig.dynamics.pair import PairDynamics
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
@@ -84,10 +86,10 @@ def rates(works: dict[str, Work], runs: int) -> dict[str, float]:
 
 
 def kernel(
-    lanes: Sequence[DynamicsT],
+    lanes: Sequence[Dynamics],
     oversampling: int,
     precision: str = "float64",
-    core: Core[DynamicsT] = THREE_PAIRS,
+    core: Core = THREE_PAIRS,
 ) -> Work:
     """The product's integrator with the mean accelerations of four channels, tables already
     packed.
@@ -259,7 +261,10 @@ def _numpy_right_hand_side(dynamics: PairDynamics) -> RightHandSide:
         dynamics.system(),
         dynamics.approach_direction(),
     )
-    n_dof, scratch = len(system.mass), _classical_scheme.scratch(len(system.mass), 0)
+    n_dof, scratch = (
+        len(system.mass),
+        _classical_scheme.scratch(1, len(system.mass), "float64"),
+    )
     motion, result = np.empty((4, LANES)), np.empty((N_LAW, LANES))
     radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
 

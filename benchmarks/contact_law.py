@@ -26,7 +26,6 @@ from benchmarks._measure import add_quick
 from benchmarks._mesh_numbers import mesh_numbers
 from gensig.dynamics._vector import LANES
 from gensig.dynamics.decimation import decimator
-from gensig.dynamics.integrator import settling_time
 from gensig.dynamics.pair import PairDynamics
 from gensig.dynamics.system import eigenvalues
 from gensig.faults.base import Fault, faulty_teeth
@@ -198,7 +197,7 @@ def record(
     step = 1.0 / (rate * oversampling)
     n_samples, n_settle = (
         round(DURATION * rate),
-        math.ceil(settling_time(dynamics) * rate),
+        math.ceil(dynamics.settling_time * rate),
     )
     first = -(low_pass.margin + n_settle)
     velocity = motion(

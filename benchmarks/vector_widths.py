@@ -19,9 +19,9 @@ from collections.abc import Sequence
 import gensig
 from benchmarks import _rates
 from benchmarks._measure import begin, write_json
-from gensig.driveline.side_by_side.line_integration import line_core
 from gensig.dynamics._vector import LANES, PRECISIONS, n_lanes
-from gensig.dynamics.backends.nystroem.method import THREE_PAIRS
+from gensig.dynamics.backends.nystroem.machine_lanes import group_kind
+from gensig.dynamics.backends.nystroem.method import THREE_PAIRS, core_of
 
 # name of a processor, as LLVM knows it; what is empty is this one
 TARGETS = {
@@ -36,7 +36,7 @@ SCALAR = "scalar Numba RK4 x5"
 def rates(runs: int, precisions: Sequence[str] = PRECISIONS) -> dict[str, float]:
     """Rates of the cores and of scalar Numba in this process."""
     pairs, boxes = _rates.machines(), _rates.two_stage_boxes()
-    box_core = line_core(boxes[0])
+    box_core = core_of(group_kind(boxes[0].equations))
     works = {SCALAR: _rates.scalar(pairs[:LANES], 5)}
     for precision in precisions:
         n = n_lanes(precision)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
+from typing import Any
 
 _watching: list[tuple[Callable[[], None], Callable[[float], None]]] = []
 
@@ -31,6 +32,17 @@ def on_compilation(
         yield
     finally:
         _watching.remove(watch)
+
+
+def readable(load: Callable[[], dict[Any, Any]]) -> dict[Any, Any]:
+    """The index of a cache on the disk; empty where another version wrote it of types of its own.
+
+    ``load`` reads it.
+    """
+    try:
+        return load()
+    except (AttributeError, ImportError):
+        return {}
 
 
 @cache

@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks import _classical_scheme
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._vector import LANES
-from gensig.dynamics.lanes import pack
+from gensig.dynamics.backends.nystroem.machine_lanes import pack
 from gensig.dynamics.pair import Body, PairDynamics, Support
 
 LAW = layout.Law._fields
@@ -36,12 +36,18 @@ def group_laws(group: layout.Group, motions: np.ndarray) -> np.ndarray:
     padded = np.concatenate([motions, np.repeat(motions[-1:], -n % LANES, axis=0)])
     padded = padded.reshape(-1, LANES, 4)
     laws = np.empty((len(padded), layout.N_LAW, LANES))
-    scratch = _classical_scheme.scratch(len(group.force) // LANES, 0)
+    scratch = scratch_of(group)
     for motion, law in zip(padded, laws, strict=True):
         _classical_scheme.law_at(
             group, np.ascontiguousarray(motion.T).ravel(), *scratch, law.ravel()
         )
     return laws.transpose(0, 2, 1).reshape(-1, layout.N_LAW)[:n]
+
+
+def scratch_of(group):
+    """Scratch of the reference for a group."""
+    n_dof = len(group.force) // LANES
+    return _classical_scheme.scratch(group.n_meshes, n_dof, "float64")
 
 
 def law_of(dynamics: PairDynamics, step: float = 1e-6) -> Callable[..., np.ndarray]:
@@ -51,7 +57,7 @@ def law_of(dynamics: PairDynamics, step: float = 1e-6) -> Callable[..., np.ndarr
     """
     group, scratch = (
         pack([dynamics], step),
-        _classical_scheme.scratch(len(dynamics.dofs), 0),
+        _classical_scheme.scratch(1, len(dynamics.dofs), "float64"),
     )
     motion, result = np.empty((4, LANES)), np.empty((layout.N_LAW, LANES))
 
@@ -106,7 +112,7 @@ def _advance(group, q, v, step, first_step, n_steps, channels=()):
     start = np.array([q - group.rest[:, 0], v], dtype=np.float64)
     state = np.repeat(start[:, :, None], LANES, axis=2)
     means = np.empty((n_steps, len(index), LANES))
-    work, wide, near = _classical_scheme.scratch(len(q), len(index))
+    work, wide, near = scratch_of(group)
     _classical_scheme.integrate(
         group,
         state.ravel(),

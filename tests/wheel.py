@@ -119,7 +119,7 @@ def environment_with(wheel: Path, folder: Path) -> Path:
 def lend_compiled(python: Path) -> None:
     """Copy the compiled kernels of this environment to the wheel, whose files are the same."""
     from gensig.driveline.time._newmark_kernels import advance
-    from gensig.dynamics.backends.nystroem._spur_pair import integrate
+    from gensig.dynamics.backends.nystroem._spur_meshes import integrate
     from gensig.mesh._kernels import lower_envelope
     from gensig.mesh.sliced._slice_kernels import solve_slices
 

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from numba.core import types
-
 from gensig.dynamics._vector import FOUR
-from gensig.dynamics._written import intrinsic, written
+from gensig.dynamics._written import type_test, written
 from gensig.mesh.pair_table import N_PAIRS
 
 MOST_PAIRS = 8  # that may be followed at once; spur gears have 4
@@ -75,16 +73,6 @@ FAR_NEAR = (
     COAST_TABLE,
     N_INDICES,
 ) = range(16)
-# rows of a cell of Group.profile
-(
-    NOMINAL_ANGLE,
-    NOMINAL_SPEED,
-    NOMINAL_ACCELERATION,
-    TORQUE,
-    TORQUE_SLOPE,
-    N_PROFILE,
-) = range(6)
-
 # rows of one pair in a slot of the scratch
 COMPLIANCE, COMPLIANCE_SLOPE, GAP, GAP_SLOPE, STIFFNESS, POSITION, N_KEPT = range(7)
 # slots; EVEN and ODD alternate as begin and end of a step
@@ -120,9 +108,9 @@ PAIR_DAMPED = (
 )  # factor of the damping of every pair
 MOST_DAMPER = PAIR_DAMPED + MOST_PAIRS  # largest damper of a pair, N s/m
 N_MESH = MOST_DAMPER + 1
-# rows of the drive at the begin of a step: nominal speed, its change, share of the set torque,
-# rotation of the pinion
-DRIVE_SPEED, DRIVE_GAIN, DRIVE_TORQUE, DRIVE_CENTER, N_DRIVE = range(5)
+# rows of the drive at the begin of a step: nominal speed of the reference, its change, and rotation
+# that the state does not hold
+DRIVE_SPEED, DRIVE_GAIN, DRIVE_CENTER, N_DRIVE = range(4)
 # rows of the mesh at an output sample: the newest pair, the normal force, that of every pair
 SEEN_NEWEST, SEEN_FORCE, SEEN_PAIRS, N_SEEN = 0, 1, 2, 2 + MOST_PAIRS
 # rows of the float64 scratch
@@ -159,66 +147,6 @@ class Law(NamedTuple):
     loaded: Any
 
 
-class Group(NamedTuple):
-    """Gear meshes of one kind side by side, with the machines around them.
-
-    ``numbers``, ``exact`` and ``indices`` hold rows as named above. ``table`` holds, lane after
-    lane, the pairs of distinct teeth (pinion's times wheel's, node, [c, c', g, g']). Where those
-    are many it holds the distinct teeth of the pinion and then those of the wheel, and
-    ``WHEEL_ROWS`` is not 0. Helical pairs have ``n_chords`` chords, one behind the other.
-    ``depth`` (lane, chord) m is the penetration from which each chord holds. ``chord_table`` has
-    the layout of the table and holds [energy in J that the chord's spring leaves out, its slope,
-    gap of the first touch, its slope]. ``n_pairs`` are followed at once. ``bend`` (lane, 4) is
-    half the distance of nodes where a column is followed by its slope, else 0: values bend
-    between nodes as their slopes say. ``tooth_row`` is the row of every tooth (-1 for a missing
-    one), ``tooth_error`` its gap in m at the pitch point, ``tooth_tilt`` the growth of that gap
-    along the path in m/m. ``prescribed`` meshes roll by the nominal rotation, not the pinion's.
-
-    The machine is M q'' + C q' + K q = f + mesh forces; q is the deviation from nominal rotation
-    and begins with pinion x, y, rotation, wheel x, y, rotation. The state is q less ``rest``
-    (dof, lane), a static equilibrium, so that it stays small. K and C are stored as diagonals and
-    as rows of their other entries (``other_first`` (dof + 1,), ``other_column``). ``set_force``
-    is f plus the mean mesh force, ``force`` the same less the force that holds the rest. The mean
-    mesh force is subtracted from the mesh force: large forces and torques balance before they are
-    rounded. ``held`` is K times, and ``carried`` M times, the rotation of each degree of freedom
-    with the pinion (``rotation``). ``reach`` (dof, lane) is the gradient of the approach.
-    ``profile`` (cell, 5, lane) holds nominal motion and torque, from cell ``profile_first`` on.
-    """
-
-    numbers: Any
-    exact: Any
-    indices: Any
-    n_pairs: int
-    n_chords: int
-    table: Any
-    depth: Any
-    chord_table: Any
-    bend: Any
-    tooth_row: Any
-    tooth_error: Any
-    tooth_tilt: Any
-    one_sided: bool
-    consistent: bool
-    prescribed: bool
-    reach: Any
-    inverse_mass: Any
-    stiffness: Any
-    damping: Any
-    other_first: Any
-    other_column: Any
-    other_stiffness: Any
-    other_damping: Any
-    force: Any
-    set_force: Any
-    rest: Any
-    rotation: Any
-    held: Any
-    carried: Any
-    profile: Any
-    profile_first: int
-    cells_per_second: float
-
-
 class Helical:
     """Helical gears.
 
@@ -226,19 +154,7 @@ class Helical:
     """
 
 
-class HelicalGroup(Group, Helical):
-    """Helical gear meshes of one kind side by side."""
-
-
-@intrinsic
-def is_helical(typing_context: Any, group: Any) -> Any:
-    """True for a group of helical gears; a constant of the compiled code."""
-    answer = issubclass(group.instance_class, Helical)
-
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return context.get_constant(types.boolean, answer)
-
-    return types.boolean(group), build
+is_helical = type_test(Helical)
 
 
 @written

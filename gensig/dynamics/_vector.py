@@ -26,7 +26,7 @@ from numba.core.typing.templates import ConcreteTemplate, infer_global, signatur
 from numba.extending import lower_builtin, models, register_model
 from numpy.typing import NDArray
 
-from gensig.compilation import watch
+from gensig.compilation import readable, watch
 from gensig.dynamics._written import OPERATIONS, intrinsic, written
 
 watch()
@@ -61,7 +61,9 @@ def _stamped(decorator):
     def decorate(function):
         dispatcher = decorator(function)
         if hasattr(dispatcher, "_cache"):  # not where NUMBA_DISABLE_JIT is set
-            dispatcher._cache._cache_file._source_stamp = _STAMP
+            files = dispatcher._cache._cache_file
+            files._source_stamp = _STAMP
+            files._load_index = functools.partial(readable, files._load_index)
             _compile_once(dispatcher)
         return dispatcher
 

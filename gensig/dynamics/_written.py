@@ -176,4 +176,20 @@ def _defined(function, typing_context, kinds):
 
 
 intrinsic: Any = Intrinsic
+
+
+def type_test(kind: type) -> Any:
+    """An intrinsic that is True for named tuples of a type; a constant of the compiled code."""
+
+    def is_of_kind(typing_context: Any, value: Any) -> Any:
+        answer = issubclass(value.instance_class, kind)
+
+        def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            return context.get_constant(types.boolean, answer)
+
+        return types.boolean(value), build
+
+    return Intrinsic(is_of_kind)
+
+
 written: Any = Written

@@ -14,7 +14,7 @@ from gensig.dynamics.backends.registry import (
     RETIRED_BACKEND,
     backend_names,
 )
-from gensig.dynamics.backends.step_limits import CoarseStepWarning, settling_time
+from gensig.dynamics.backends.step_limits import CoarseStepWarning
 from gensig.dynamics.pair import DOFS, PairDynamics
 from gensig.errors import ConfigError, SimulationError
 
@@ -30,7 +30,6 @@ __all__ = [
     "count_samples",
     "integrate",
     "records_together",
-    "settling_time",
 ]
 
 MOST_BYTES = 2**28  # of the samples of the records that are simulated side by side

@@ -1,35 +1,31 @@
-"""Gear pairs side by side: from their equations to the flat arrays of the compiled core."""
+"""Teeth of gear meshes side by side: from their tables to flat arrays of the compiled core."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._layout import COLUMNS, FAR_NEAR, Group, HelicalGroup
+from gensig.dynamics._layout import COLUMNS, FAR_NEAR
 from gensig.dynamics._vector import n_lanes
+from gensig.dynamics.equations import Mesh
 from gensig.dynamics.helical import half_lag, pitches
 from gensig.dynamics.mesh_statics import least_gaps
 from gensig.dynamics.mesh_teeth import MeshTeeth
-from gensig.dynamics.pair import PairDynamics
 from gensig.mesh.pair_table import GearTable, PairTable
 from gensig.mesh.sliced.sliced_statics import left_out_energy
 from gensig.mesh.sliced.sliced_table import SlicedTable
 
 Array = NDArray[np.float64]
 
-CELLS_PER_SECOND = 1000.0  # speed and torque are linear in each cell
 MOST_PAIRS = 2  # for each distinct tooth; with more, spur teeth are stored one by one
 
-
 MachineT = TypeVar("MachineT")
-GroupT = TypeVar("GroupT", bound=Any)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,135 +102,27 @@ def side_by_side(values: Array, precision: str) -> NDArray[np.floating]:
     return np.ascontiguousarray(np.moveaxis(values, 0, -1), dtype=precision).ravel()
 
 
-def pack(
-    dynamics: Sequence[PairDynamics],
-    step: float,
-    precision: str = "float64",
-    span: tuple[float, float] = (0.0, 0.0),
-    *,
-    end: Sequence[float] | Array = (),
-) -> Group:
-    """Gear pairs of one mesh law as one group.
-
-    Parameters
-    ----------
-    step : s    of integration, over which the paper's law switches a pair
-    span : s    begin and end of the required course of speed and torque, where they change
-    end : values after the last lane's in ``Group.table``
-    """
-    packed = partial(side_by_side, precision=precision)
-    lanes = fill_lanes(dynamics, precision)
-    mesh = MeshLanes.of([machine.teeth for machine in lanes])
-    systems = [machine.system() for machine in lanes]
-    rests = np.stack([machine.rest() for machine in lanes])
-    reach = np.stack([machine.approach_direction() for machine in lanes])
-    mean_force = np.array([machine.mesh_force for machine in lanes])
-    numbers = np.array(
-        [
-            pair_numbers(machine, step, rest)
-            for machine, rest in zip(lanes, rests, strict=True)
-        ]
-    )
-    chords = [each.values[..., COLUMNS:].ravel() for each in mesh.rows]
-
-    def stacked(name: str) -> Array:
-        return np.stack([getattr(system, name) for system in systems])
-
-    mass, rotation = stacked("mass"), stacked("rotation")
-    stiffness, damping = stacked("stiffness"), stacked("damping")
-    dofs = np.arange(mass.shape[1])
-    coupled = np.any((stiffness != 0.0) | (damping != 0.0), axis=0)
-    coupled[dofs, dofs] = False
-    row, column = np.nonzero(coupled)
-    set_force = stacked("force") - mean_force[:, None] * reach
-    profile, profile_first, cells_per_second = _profile(lanes, span)
-    options = lanes[0].table.options
-    kind = HelicalGroup if lanes[0].is_helical else Group
-    return kind(
-        numbers=packed(numbers),
-        exact=mesh.exact.T.ravel(),
-        indices=mesh.indices.T.ravel(),
-        n_pairs=int(mesh.indices[:, layout.FOLLOWED].max()),
-        n_chords=mesh.depth.shape[1],
-        table=np.concatenate([*mesh.table(), end], dtype=np.dtype(precision)),
-        depth=mesh.depth.astype(precision).ravel(),
-        chord_table=np.concatenate(chords, dtype=np.dtype(precision)),
-        bend=mesh.bend.astype(precision).ravel(),
-        tooth_row=mesh.tooth_row,
-        tooth_error=mesh.tooth_error,
-        tooth_tilt=mesh.tooth_tilt,
-        one_sided=options.law == "one_sided",
-        consistent=options.roll_torque == "consistent",
-        prescribed=options.phase == "prescribed",
-        reach=packed(reach),
-        inverse_mass=packed(1.0 / mass),
-        stiffness=packed(stiffness[:, dofs, dofs]),
-        damping=packed(damping[:, dofs, dofs]),
-        other_first=np.searchsorted(row, np.arange(len(dofs) + 1)),
-        other_column=np.ascontiguousarray(column),
-        other_stiffness=packed(stiffness[:, row, column]),
-        other_damping=packed(damping[:, row, column]),
-        force=packed(set_force - np.einsum("lij,lj->li", stiffness, rests)),
-        set_force=packed(set_force),
-        rest=np.ascontiguousarray(rests.T),
-        rotation=packed(rotation),
-        held=packed(np.einsum("lij,lj->li", stiffness, rotation)),
-        carried=packed(mass * rotation),
-        profile=profile,
-        profile_first=profile_first,
-        cells_per_second=cells_per_second,
-    )
-
-
-def at_step(group: GroupT, before: float, after: float) -> GroupT:
+def at_step(group: Any, before: float, after: float) -> Any:
     """The same group for another step, s; only the paper's law depends on it."""
     if group.one_sided:
         return group
-    numbers = group.numbers.copy().reshape(layout.N_NUMBERS, -1)
-    numbers[layout.PER_SWITCH_WIDTH] *= before / after
+    numbers = group.numbers.copy().reshape(group.n_meshes, layout.N_NUMBERS, -1)
+    numbers[:, layout.PER_SWITCH_WIDTH] *= before / after
     return group._replace(numbers=numbers.ravel())
 
 
-def pair_numbers(dynamics: PairDynamics, step: float, rest: Array) -> tuple[float, ...]:
-    """The mesh of a pair as numbers, see ``mesh_numbers``.
+def mesh_numbers(mesh: Mesh, rest: Array, step: float) -> tuple[float, ...]:
+    """The mesh as numbers, in the order of the rows of ``_layout``.
 
     Parameters
     ----------
-    step : s    of the integration
     rest : (dof,)    the equilibrium from which the state is counted
+    step : s         of the integration, over which the paper's law switches a pair
     """
-    damping = dynamics.mesh_damping
-    if dynamics.table.options.law == "one_sided":
-        damping = damping / dynamics.mesh_force
-    speed = dynamics.table.pair.pinion.base_radius * dynamics.operating.speed
-    return mesh_numbers(
-        dynamics.teeth,
-        damping=damping,
-        mean_force=dynamics.mesh_force,
-        rest_approach=float(dynamics.approach_direction() @ rest),
-        per_switch_width=2.0 / (speed * step),
-    )
-
-
-def mesh_numbers(
-    teeth: MeshTeeth,
-    *,
-    damping: float,
-    mean_force: float,
-    rest_approach: float,
-    per_switch_width: float = 0.0,
-) -> tuple[float, ...]:
-    """The mesh as numbers, in the order of the rows of ``_layout.Group.numbers``.
-
-    Parameters
-    ----------
-    damping : N s/m, of the one-sided law per N of the force of a pair of teeth
-    mean_force : N, that the forces of the group leave out
-    rest_approach : m, at the equilibrium from which the state is counted
-    per_switch_width : 1/m, of the paper's law
-    """
-    table, options, pair = teeth.table, teeth.table.options, teeth.pair
-    lag = half_lag(table)
+    table, options, pair = mesh.teeth.table, mesh.teeth.table.options, mesh.teeth.pair
+    lag, per_switch_width = half_lag(table), 0.0
+    if options.law != "one_sided":
+        per_switch_width = 2.0 / (pair.pinion.base_radius * mesh.speed * step)
     return (
         pair.pinion.base_radius,
         pair.wheel.base_radius,
@@ -243,20 +131,20 @@ def mesh_numbers(
         pair.start_curvature_radius,
         pair.tangent_length,
         table.shared_compliance,
-        damping,
+        mesh.damping,
         options.friction_coefficient,
         2.0 / (options.friction_transition * pair.base_pitch + 2.0 * lag),
         per_switch_width,
         pair.backlash,
-        mean_force,
-        rest_approach,
+        mesh.mean_force,
+        mesh.approach(rest),
         lag,
         pair.pitch_point + lag,
     )
 
 
 def _exact_numbers(teeth: MeshTeeth) -> tuple[float, ...]:
-    """Numbers that locate the pairs, in the order of the rows of ``_layout.Group.exact``."""
+    """Numbers that locate the pairs, in the order of the rows of ``_layout``."""
     options, pair = teeth.table.options, teeth.pair
     near = -math.inf, math.inf
     if options.law == "one_sided":
@@ -297,7 +185,7 @@ def nearest_gaps(teeth: MeshTeeth) -> Array:
 def _mesh_indices(
     meshes: Sequence[MeshTeeth], teeth: Sequence[ToothRows]
 ) -> NDArray[np.int64]:
-    """Indices of every lane into the tables, (lane, row of ``Group.indices``)."""
+    """Indices of every lane into the tables, (lane, row)."""
     indices = []
     first_tooth, first_value = 0, 0
     for mesh, rows in zip(meshes, teeth, strict=True):
@@ -329,48 +217,6 @@ def _mesh_indices(
         first_tooth += len(rows.row)
         first_value += len(rows.values) * n_chords * per_chord
     return np.array(indices, dtype=np.int64)
-
-
-def profile_cells(span: tuple[float, float]) -> tuple[int, Array]:
-    """Number of the first cell of a profile over a span in s, and edges of all, (cell + 1,) s.
-
-    Cells begin at multiples of their length, so that an instant has the same bits in any span.
-    """
-    first = math.floor(span[0] * CELLS_PER_SECOND)
-    last = max(math.ceil(span[1] * CELLS_PER_SECOND), first + 1)
-    return first, np.arange(first, last + 1) / CELLS_PER_SECOND
-
-
-def _profile(
-    lanes: Sequence[PairDynamics], span: tuple[float, float]
-) -> tuple[Array, int, float]:
-    """Nominal motion and torque by cells of time, the number of the first cell, cells a second.
-
-    Values are (cell, 5, lane) flat. Speed and torque are linear in a cell; where neither changes
-    there is one cell.
-    """
-    if all(machine.operating.is_steady for machine in lanes):
-        profile = np.zeros((1, layout.N_PROFILE, len(lanes)))
-        profile[0, layout.NOMINAL_SPEED] = [
-            machine.operating.speed for machine in lanes
-        ]
-        profile[0, layout.TORQUE] = 1.0
-        return profile.ravel(), 0, 1.0
-    first, edges = profile_cells(span)
-    profile = np.empty((len(edges) - 1, layout.N_PROFILE, len(lanes)))
-    for lane, machine in enumerate(lanes):
-        nominal = machine.nominal(edges)
-        speed, torque = nominal.speed, nominal.torque_factor
-        turned = 0.5 * (speed[1:] + speed[:-1]) / CELLS_PER_SECOND
-        before = -np.cumsum(turned[:-first][::-1])[::-1]
-        angle = np.concatenate([before, [0.0], np.cumsum(turned[-first:])])
-        profile[:, layout.NOMINAL_ANGLE, lane] = angle[:-1]
-        profile[:, layout.NOMINAL_SPEED, lane] = speed[:-1]
-        gain = np.diff(speed) * CELLS_PER_SECOND
-        profile[:, layout.NOMINAL_ACCELERATION, lane] = gain
-        profile[:, layout.TORQUE, lane] = torque[:-1]
-        profile[:, layout.TORQUE_SLOPE, lane] = np.diff(torque) * CELLS_PER_SECOND
-    return profile.ravel(), first, CELLS_PER_SECOND
 
 
 def _chord_depths(meshes: Sequence[MeshTeeth]) -> Array:

@@ -12,13 +12,19 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.dynamics.equations import PAIR_SLIDE, Equations, Mesh
 from gensig.dynamics.helical import AXIAL_DOFS, axial_reach, pitches
 from gensig.dynamics.mesh_teeth import MeshTeeth
-from gensig.dynamics.system import LumpedSystem, eigenvalues
+from gensig.dynamics.system import (
+    LumpedSystem,
+    eigenvalues,
+    settling_time,
+    slowest_decay,
+)
 from gensig.errors import ConfigError
 from gensig.mesh.pair_table import PairTable
 from gensig.mesh.sliced.sliced_table import SlicedTable
-from gensig.operation.setpoint import Nominal, Operating
+from gensig.operation.setpoint import Operating
 from gensig.units import split_unit, unit
 
 Array = NDArray[np.float64]
@@ -231,6 +237,12 @@ class PairDynamics:
         return self.reduced_inertia * self._drive_rate**2
 
     @property
+    def drive_damping(self) -> float:
+        """Torsional damper of the soft speed source, N m s/rad."""
+        ratio_and_inertia = self.operating.drive_damping_ratio * self.reduced_inertia
+        return 2.0 * ratio_and_inertia * self._drive_rate
+
+    @property
     def _drive_rate(self) -> float:
         """Circular frequency of the soft speed source on all rotating bodies, rad/s."""
         return 2.0 * math.pi * self.operating.drive_frequency
@@ -272,8 +284,7 @@ class PairDynamics:
                 _couple(stiffness, dof, gear, rotor.coupling_stiffness)
                 _couple(damping, dof, gear, rotor.coupling_damping(mass[gear]))
         spring[driver] += self.drive_stiffness
-        ratio_and_inertia = self.operating.drive_damping_ratio * self.reduced_inertia
-        damper[driver] += 2.0 * ratio_and_inertia * self._drive_rate
+        damper[driver] += self.drive_damping
         force[driver] = self.operating.torque + self.friction_torque()
         if self.motor is not None:
             lead = self.drive_stiffness * force[driver] / self.motor.coupling_stiffness
@@ -287,10 +298,6 @@ class PairDynamics:
             force=force,
             rotation=rotation,
         )
-
-    def nominal(self, times: Array) -> Nominal:
-        """Nominal motion of the pinion and share of the set torque at times in s, (time,)."""
-        return self.operating.nominal(times)
 
     def approach_direction(self) -> Array:
         """Gradient of the approach along the line of action, (dof,)."""
@@ -319,10 +326,79 @@ class PairDynamics:
         stiffness = 1.2 * self.mean_mesh_stiffness
         return eigenvalues(self.system(), self.approach_direction(), stiffness)
 
+    @cached_property
+    def settling_time(self) -> float:
+        """Time after which the start's transient has fallen to 1e-4 (longest 0.45 s), s."""
+        direction = self.approach_direction()
+        rate = slowest_decay(self.system(), direction, self.mean_mesh_stiffness)
+        return settling_time(rate)
+
+    @cached_property
+    def equations(self) -> Equations:
+        """As ``Dynamics.equations``: one mesh, held by the soft speed source alone."""
+        system, options, (driver, _) = self.system(), self.table.options, self._ends
+        n_touched, force = len(self.gear_dofs), self.mesh_force
+        held, stiffness, damping = (
+            np.zeros(len(self.dofs)),
+            system.stiffness.copy(),
+            system.damping.copy(),
+        )
+        held[driver] = math.sqrt(self.drive_stiffness)
+        stiffness[driver, driver] -= self.drive_stiffness
+        damping[driver, driver] -= self.drive_damping
+        slide = np.zeros(n_touched)
+        slide[: len(PAIR_SLIDE)] = PAIR_SLIDE
+        mesh = Mesh(
+            teeth=self.teeth,
+            touched=np.arange(n_touched),
+            reach=self.approach_direction()[:n_touched],
+            slide=slide,
+            damping=self.mesh_damping / (force if options.law == "one_sided" else 1.0),
+            mean_force=force,
+            speed=self.operating.speed,
+        )
+        return Equations(
+            mass=system.mass,
+            stiffness=stiffness,
+            damping=damping,
+            rotation=system.rotation,
+            held=held,
+            held_damping=self.drive_damping / self.drive_stiffness,
+            meshes=(mesh,),
+            sources=(),
+            reference=PINION_ROTATION,
+            angles=(PINION_ROTATION,),
+        )
+
+    @property
+    def is_steady(self) -> bool:
+        """True where neither speed nor torque changes."""
+        return self.operating.is_steady
+
+    def course(self, times: Array) -> tuple[Array, Array]:
+        """As ``Dynamics.course``; the speed is straight between the times."""
+        speed = self.operating.nominal(times).speed
+        turned = 0.5 * (speed[1:] + speed[:-1]) * np.diff(times)
+        now = int(np.searchsorted(times, 0.0))
+        # from time 0 outwards, so that an instant has the same bits in any span
+        before = -np.cumsum(turned[:now][::-1])[::-1]
+        return np.concatenate([before, [0.0], np.cumsum(turned[now:])]), speed
+
+    def forces(self, times: Array) -> Array:
+        """As ``Dynamics.forces``: all of them follow the torque."""
+        return np.outer(
+            self.operating.nominal(times).torque_factor, self.system().force
+        )
+
+    def factors(self, times: Array) -> Array:
+        """As ``Dynamics.factors``: no torque follows an angle."""
+        return np.zeros((len(times), 0))
+
     def friction_torque(self) -> float:
         """Mean friction torque reduced to the pinion, N m."""
         return self.teeth.friction_torque(self.mesh_force)
 
+    @cached_property
     def rest(self) -> Array:
         """Deflections of supports and couplings about which the machine moves, (dof,).
 

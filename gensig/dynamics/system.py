@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 from gensig.errors import SimulationError
 
 Array = NDArray[np.float64]
+
+LONGEST_SETTLING = 0.45  # s
+SETTLED = 1e-4  # share of the start's transient that is left
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +74,11 @@ def slowest_decay(
     """
     rates = -np.real(eigenvalues(system, direction, mesh_stiffness))
     return float(rates[rates > 1e-3].min(initial=np.inf))
+
+
+def settling_time(slowest: float) -> float:
+    """Time in which motion of the slowest decay rate in 1/s falls to 1e-4 (longest 0.45 s), s."""
+    return min(LONGEST_SETTLING, math.log(1.0 / SETTLED) / slowest)
 
 
 def stiffest_motion(

@@ -14,11 +14,11 @@ from gensig.driveline.running import RunningLine, touched_dofs, turning_sense
 from gensig.driveline.side_by_side.line_statics import line_at_rest
 from gensig.driveline.time.course import ShaftTorque
 from gensig.driveline.time.mesh_friction import slide_direction
-from gensig.dynamics.backends.nystroem.method import is_followed_by_three
 from gensig.dynamics.backends.nystroem.stability import stable_rate
-from gensig.dynamics.backends.step_limits import LONGEST_SETTLING, SETTLED
+from gensig.dynamics.equations import A_TURN, NONE, Equations, Mesh, OverAngle
 from gensig.dynamics.integrator import Solver
 from gensig.dynamics.mesh_teeth import MeshTeeth
+from gensig.dynamics.system import settling_time
 from gensig.errors import SimulationError, StepError
 
 Array = NDArray[np.float64]
@@ -50,36 +50,66 @@ class LineDynamics:
     angles: tuple[int, ...]
 
     @property
-    def has_chords(self) -> bool:
-        """True if a mesh is helical or has more than three pairs of teeth in contact."""
-        return not all(is_followed_by_three(teeth) for teeth in self.teeth)
-
-    @property
     def dofs(self) -> tuple[str, ...]:
         """Names of the degrees of freedom."""
         return self.running.line.names
 
     @cached_property
-    def reach(self) -> Array:
-        """Gradient of the approach along the degrees of freedom of every mesh, (mesh, 6)."""
-        reach = np.zeros(self.touched.shape)
-        for row, mesh, dofs in zip(
-            reach, self.running.line.meshes, self.touched, strict=True
-        ):
-            row[dofs >= 0] = mesh.direction[dofs[dofs >= 0]]
-        return reach
+    def equations(self) -> Equations:
+        """As ``Dynamics.equations``."""
+        line = self.running.line
+        held = np.zeros(len(line.names)) if line.held is None else line.held
+        rigid = np.outer(held, held)
+        return Equations(
+            mass=np.diag(line.mass),
+            stiffness=line.stiffness - rigid,
+            damping=line.damping - line.held_damping * rigid,
+            rotation=line.rotation,
+            held=held,
+            held_damping=line.held_damping,
+            meshes=tuple(self._mesh(m) for m in range(len(self.teeth))),
+            sources=tuple(self._over_angle(torque) for torque in self.sources),
+            reference=self.reference,
+            angles=self.angles,
+        )
+
+    def _mesh(self, m: int) -> Mesh:
+        running, mesh, dofs = (
+            self.running,
+            self.running.line.meshes[m],
+            self.touched[m],
+        )
+        slide = slide_direction(mesh.direction, dofs, self.senses[m])
+        is_there = dofs != NONE
+        turning = abs(float(running.line.rotation[dofs[A_TURN]]))
+        return Mesh(
+            teeth=self.teeth[m],
+            touched=dofs,
+            reach=np.where(is_there, mesh.direction[dofs], 0.0),
+            slide=np.where(is_there, slide[dofs], 0.0),
+            damping=mesh.damping,
+            mean_force=float(running.mesh_force[m]),
+            speed=turning * float(running.course.speed[0]),
+        )
+
+    def _over_angle(self, torque: ShaftTorque) -> OverAngle:
+        sense, n_nodes = self._sense(torque), len(torque.table)
+        per_rad = n_nodes / torque.period
+        return OverAngle(
+            dof=torque.dof,
+            nodes=sense * torque.table,
+            per_rad=sense * per_rad,
+            shift=torque.phase * per_rad,
+        )
 
     @property
-    def slide(self) -> Array:
-        """Direction of friction along the degrees of freedom of every mesh, (mesh, 6)."""
-        slide = np.zeros_like(self.reach)
-        meshes = zip(
-            slide, self.running.line.meshes, self.touched, self.senses, strict=True
-        )
-        for row, mesh, dofs, sense in meshes:
-            along = slide_direction(mesh.direction, dofs, sense)
-            row[dofs >= 0] = along[dofs[dofs >= 0]]
-        return slide
+    def is_steady(self) -> bool:
+        """True where neither speed nor torques change."""
+        return len(self.running.course.time) == 1
+
+    def course(self, times: Array) -> tuple[Array, Array]:
+        """As ``Dynamics.course``."""
+        return self.running.course.nominal(times)
 
     @cached_property
     def mesh_stiffness(self) -> Array:
@@ -93,12 +123,11 @@ class LineDynamics:
         """Eigenvalues with the meshes held at 1.2 times their mean stiffness, 1/s."""
         return self._rates(STIFFER)
 
-    @property
+    @cached_property
     def settling_time(self) -> float:
         """Time after which the start's transient has fallen to 1e-4 (longest 0.45 s), s."""
         rates = -np.real(self._rates(1.0))
-        slowest = float(rates[rates > 1e-3].min(initial=np.inf))
-        return min(LONGEST_SETTLING, math.log(1.0 / SETTLED) / slowest)
+        return settling_time(float(rates[rates > 1e-3].min(initial=np.inf)))
 
     def _rates(self, stiffer: float) -> NDArray[np.complex128]:
         line = self.running.line
@@ -159,7 +188,7 @@ class LineDynamics:
         """Torques that follow the angle of their degree of freedom."""
         return tuple(t for t in self.running.torques if len(t.table) > 1)
 
-    def sense(self, torque: ShaftTorque) -> float:
+    def _sense(self, torque: ShaftTorque) -> float:
         """1 where the angle that a torque acts on counts as it nominally rotates, else -1."""
         return math.copysign(1.0, float(self.running.line.rotation[torque.dof]))
 
@@ -180,7 +209,7 @@ class LineDynamics:
         """Means of torques over their angle at times in s, (time, dof)."""
         forces = np.zeros((len(times), len(self.dofs)))
         for torque in torques:
-            mean = self.sense(torque) * float(torque.table.mean())
+            mean = self._sense(torque) * float(torque.table.mean())
             forces[:, torque.dof] += mean * self._factor(torque, times)
         return forces
 

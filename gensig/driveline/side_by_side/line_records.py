@@ -14,10 +14,11 @@ from gensig.driveline.side_by_side.line_dynamics import (
     check_line,
     line_dynamics,
 )
-from gensig.driveline.side_by_side.line_integration import integrate_lines
 from gensig.driveline.side_by_side.line_mesh_states import line_mesh_state
 from gensig.dynamics.backends.base import N_SEEN, Integration, Motions
-from gensig.dynamics.backends.nystroem._line_layout import A_TURN
+from gensig.dynamics.backends.nystroem.machine_lanes import group_kind
+from gensig.dynamics.backends.registry import BACKENDS, EXPLICIT_BACKEND
+from gensig.dynamics.equations import A_TURN
 from gensig.dynamics.mesh_state import MeshState
 from gensig.errors import SimulationError
 from gensig.systems.integration_checks import (
@@ -94,7 +95,7 @@ def _kind(run: LineRun, line: LineDynamics) -> tuple[object, ...]:
         machine.mesh.roll_torque,
         line.dofs,
         line.touched.tobytes(),
-        line.has_chords,
+        group_kind(line.equations),
         line.angles,
         tuple(source.dof for source in line.sources),
     )
@@ -117,7 +118,7 @@ def _together(
         precision=solver.precision,
         max_error=solver.max_error,
     )
-    motions = integrate_lines(machines, integration)
+    motions = BACKENDS[EXPLICIT_BACKEND].integrate(machines, integration)
     errors, verdicts = checks(motions, solver, rate)
     records: list[CleanRecord | SimulationError] = []
     for index, (run, line) in enumerate(zip(runs, machines, strict=True)):

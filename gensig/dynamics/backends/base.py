@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gensig.dynamics._layout import MOST_PAIRS as MOST_PAIRS
 from gensig.dynamics._layout import N_SEEN as N_SEEN
 from gensig.dynamics._layout import SEEN_FORCE as SEEN_FORCE
+from gensig.dynamics.equations import Dynamics
 from gensig.dynamics.pair import PairDynamics
 from gensig.errors import ConfigError
 
@@ -104,11 +105,11 @@ class Backend(ABC):
 
     @abstractmethod
     def integrate(
-        self, machines: Sequence[PairDynamics], integration: Integration
+        self, machines: Sequence[Dynamics], integration: Integration
     ) -> Motions:
         """Settled motions of machines that have passed ``check_step``.
 
-        The machines share their degrees of freedom and the kind of their mesh law. The motion of a
+        The machines share their bodies, meshes and the options of their mesh law. The motion of a
         machine must not depend on the other machines of the call, nor on their number.
         """
 

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.backends.base import OUT_OF_BOUNDS, Integration, Motions
-from gensig.dynamics.backends.group_run import Core, Dynamics, DynamicsT, GroupRun
+from gensig.dynamics.backends.group_run import Core, GroupRun
 from gensig.dynamics.backends.step_limits import FINE_TIME, SETTLING_STEPS
 from gensig.dynamics.decimation import decimator
+from gensig.dynamics.equations import Dynamics
 from gensig.dynamics.lanes import at_step, fill_lanes
 
 Array = NDArray[np.float64]
@@ -25,7 +26,7 @@ CHECKED = 0.03  # s at the beginning of a record, integrated again at half the s
 
 
 def integrate_machines(
-    machines: Sequence[DynamicsT], integration: Integration, core: Core[DynamicsT]
+    machines: Sequence[Dynamics], integration: Integration, core: Core
 ) -> Motions:
     """Motions of machines, integrated in groups that settle in the same steps."""
     groups = lane_groups(machines, integration, core)
@@ -37,7 +38,7 @@ def integrate_machines(
 
 
 def lane_groups(
-    machines: Sequence[DynamicsT], integration: Integration, core: Core[DynamicsT]
+    machines: Sequence[Dynamics], integration: Integration, core: Core
 ) -> list[list[int]]:
     """Indices of the machines of each group; machines of one group settle in the same steps."""
     by_steps: dict[int, list[int]] = {}
@@ -53,9 +54,7 @@ def lane_groups(
     ]
 
 
-def settling_steps(
-    machine: DynamicsT, integration: Integration, core: Core[DynamicsT]
-) -> int:
+def settling_steps(machine: Dynamics, integration: Integration, core: Core) -> int:
     """Steps per sample in which a machine settles."""
     fine = integration.oversampling
     stable = core.coarsest_oversampling(machine, fine, integration.sampling_rate)
@@ -97,7 +96,7 @@ class GroupSteps:
 
 
 def integrate_group(
-    machines: Sequence[DynamicsT], integration: Integration, core: Core[DynamicsT]
+    machines: Sequence[Dynamics], integration: Integration, core: Core
 ) -> Motions:
     """Motions of machines in one group, from time 0 on, after they have settled.
 
@@ -109,7 +108,7 @@ def integrate_group(
     # output samples; time 0 is the first recorded one
     end = -low_pass.margin - math.ceil(FINE_TIME * rate)
     # every lane begins at a time of its own; its motion before is not used
-    durations = [math.ceil(settling_time(core, machine) * rate) for machine in lanes]
+    durations = [math.ceil(settling_time(machine) * rate) for machine in lanes]
     begins = [min(end - 1, -low_pass.margin - n) for n in durations]
     span = min(begins) / rate, integration.duration + low_pass.margin / rate
     packed_step = 1.0 / (rate * oversampling)
@@ -125,17 +124,17 @@ def integrate_group(
     return recorded(run, steps, integration, end)
 
 
-def settling_time(core: Core[DynamicsT], machine: DynamicsT) -> float:
+def settling_time(machine: Dynamics) -> float:
     """Time after which a machine's start from rest has settled, s."""
-    return core.settling_time(machine)
+    return machine.settling_time
 
 
 def pack_group(
-    machines: Sequence[DynamicsT],
+    machines: Sequence[Dynamics],
     step: float,
     precision: str,
     span: tuple[float, float],
-    core: Core[DynamicsT],
+    core: Core,
 ) -> Any:
     """Machines as a group of a compiled core."""
     return core.pack(machines, step, precision, span)
@@ -205,6 +204,7 @@ def recorded(
     if integration.max_error is not None:
         check = half_step(checking, steps, integration)
     turned = angle[:, 0, -1] - angle[:, 0, 0]
+    angle += group.rest[group.angles].T[:, :, None]
     n_steps = (n_samples + 2 * low_pass.margin - 1) * fine + 1
     return Motions(
         acceleration=list(acceleration),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,50 +15,32 @@ from gensig.dynamics._layout import CENTER, N_SEEN
 from gensig.dynamics._record_kernels import LOW_PASS_PRECISION
 from gensig.dynamics._vector import aligned, n_lanes
 from gensig.dynamics.decimation import Decimator
+from gensig.dynamics.equations import Dynamics
 
 Array = NDArray[np.float64]
 
 
-class Dynamics(Protocol):
-    """A machine that can be integrated: a gear pair, or a line of several meshes."""
-
-    @property
-    def dofs(self) -> tuple[str, ...]:
-        """Names of the degrees of freedom."""
-
-    def start(self, time: float) -> tuple[Array, Array]:
-        """Deflections and their rates from which a motion settles at a nominal time, (dof,) each.
-
-        Rates are 0 where the machine starts at rest.
-        """
-
-
 NOTHING = np.empty(0)
 NO_TAPS = np.empty(0, dtype=LOW_PASS_PRECISION)
-DynamicsT = TypeVar("DynamicsT", bound=Dynamics)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Core(Generic[DynamicsT]):
+class Core:
     """A method in compiled functions, as ``_record_kernels.integrate`` describes them.
 
     Parameters
     ----------
-    pack : machines of one kind as one group; arguments are those of ``lanes.pack``
-    scratch : work rows, float64 rows and integers for degrees of freedom, channels and precision
+    pack : machines of one kind as one group, for a step in s, a precision, and a span in s
+    scratch : work rows, float64 rows and integers for meshes, degrees of freedom and precision
+    integrate : advances a group in the precision of its scratch
     coarsest_oversampling : the least stable number of steps per sample of a machine, at most a
         given one, at a sampling rate
-    settling_time : after which a start from rest has settled, s
-    n_meshes, n_angles : meshes of a machine, and angles that are given out
     """
 
-    pack: Callable[[Sequence[DynamicsT], float, str, tuple[float, float]], Any]
+    pack: Callable[[Sequence[Dynamics], float, str, tuple[float, float]], Any]
     scratch: Callable[[int, int, str], tuple[NDArray[Any], Array, NDArray[np.int64]]]
     integrate: Any
-    coarsest_oversampling: Callable[[DynamicsT, int, float], int]
-    settling_time: Callable[[DynamicsT], float]
-    n_meshes: int = 1
-    n_angles: int = 1
+    coarsest_oversampling: Callable[[Dynamics, int, float], int]
 
 
 class GroupRun:
@@ -69,15 +51,16 @@ class GroupRun:
         lanes: Sequence[Dynamics],
         channels: NDArray[np.int64],
         precision: str,
-        core: Core[Any],
+        core: Core,
     ) -> None:
-        n_dof = len(lanes[0].dofs)
+        n_dof, equations = len(lanes[0].dofs), lanes[0].equations
+        self.n_meshes, self.n_angles = len(equations.meshes), len(equations.angles)
         self.n_lanes, self.channels, self.precision = len(lanes), channels, precision
         self.core = core
         self.state = aligned(np.zeros((2, n_dof, self.n_lanes), dtype=precision))
-        self.lost = aligned(np.zeros((core.n_meshes, self.n_lanes), dtype=precision))
+        self.lost = aligned(np.zeros((self.n_meshes, self.n_lanes), dtype=precision))
         self.fresh = np.ones(self.n_lanes, dtype=precision)
-        scratch = core.scratch(n_dof, len(channels), precision)
+        scratch = core.scratch(self.n_meshes, n_dof, precision)
         self.work, self.wide, self.near = map(aligned, scratch)
 
     @property
@@ -152,10 +135,10 @@ class GroupRun:
         factor, margin = low_pass.oversampling, low_pass.margin
         n_channels, n_seen = len(self.channels), 0
         if with_mesh_state:
-            n_seen = N_SEEN * self.core.n_meshes
+            n_seen = N_SEEN * self.n_meshes
         out = np.empty((self.n_lanes, n_channels, n_samples))
         n_rows = n_samples + 2 * margin
-        angle = np.empty((n_rows, self.core.n_angles, self.n_lanes))
+        angle = np.empty((n_rows, self.n_angles, self.n_lanes))
         seen = np.empty((len(angle), n_seen, self.n_lanes))
         taps = low_pass.padded(LOW_PASS_PRECISION)
         per_step = n_channels * self.n_lanes

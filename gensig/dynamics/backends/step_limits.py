@@ -1,4 +1,4 @@
-"""Warnings and refusals of long steps, and the time of the settling."""
+"""Warnings and refusals of long steps."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ import warnings
 import numpy as np
 
 from gensig.dynamics.pair import PairDynamics
-from gensig.dynamics.system import slowest_decay, stiffest_motion
+from gensig.dynamics.system import stiffest_motion
 from gensig.errors import StepError
 
-LONGEST_SETTLING = 0.45  # s
-SETTLED = 1e-4  # share of the start's transient that is left
 FASTEST_GEARS = 1e6  # Hz, above which sizes are wrong rather than steps too long
 LONG_STEP = 0.5  # |lambda| h, above which the error may exceed 1e-3
 COARSE_STABILITY = 0.6  # share of the limit: tables may be stiffer than their mean
@@ -25,14 +23,6 @@ class CoarseStepWarning(UserWarning):
     """A step that is stable but too long for the stated error."""
 
     once = True  # each machine of a plan says it with other numbers
-
-
-def settling_time(dynamics: PairDynamics) -> float:
-    """Time after which the start's transient has fallen to 1e-4 (longest 0.45 s), s."""
-    rate = slowest_decay(
-        dynamics.system(), dynamics.approach_direction(), dynamics.mean_mesh_stiffness
-    )
-    return min(LONGEST_SETTLING, math.log(1.0 / SETTLED) / rate)
 
 
 def too_long_steps(

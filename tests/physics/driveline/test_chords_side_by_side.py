@@ -18,7 +18,7 @@ from side_by_side_lines import (
 
 import gensig
 from gensig.driveline.reading import read_line_machine
-from gensig.driveline.side_by_side.line_dynamics import LineDynamics
+from gensig.dynamics.backends.nystroem import machine_lanes
 from gensig.dynamics.decimation import in_band_error
 from gensig.faults.broken import MissingTooth
 from gensig.plan.request import read_request
@@ -50,6 +50,13 @@ CROWNED = (
     "gear.wheel.support.damping_x_ns_per_m=500",
 )
 
+SLANTED = (
+    "system=helical_pair",
+    "mesh.n_slices=8",
+    "modification.pinion.crowning_um=15",
+    "operating.drive_frequency_hz=20",
+)
+
 
 def line(*words):
     """A line machine by overrides."""
@@ -62,10 +69,11 @@ def helical():
     return line(*HELICAL)
 
 
+@pytest.mark.parametrize("words", [CROWNED, SLANTED], ids=["crowned", "helical"])
 @pytest.mark.parametrize("faults", [(), MISSING], ids=["sound", "missing"])
-def test_a_pair_with_chords_as_a_line_moves_as_the_pair(faults):
-    """Crowned spur slices, which act on no motion out of their plane."""
-    system = read_system(read_request([*CROWNED]).config)
+def test_a_pair_with_chords_as_a_line_moves_as_the_pair(faults, words):
+    """Crowned spur slices, and teeth that move the gears along their axes and tilt them."""
+    system = read_system(read_request([*words]).config)
     start = Start(tooth_pinion=3, tooth_wheel=5, phase=0.3)
     run = Run(system=system, faults=faults, start=start, specimen=specimen_of(system))
     pair = pair_dynamics(run)
@@ -156,7 +164,7 @@ def test_spur_teeth_have_one_chord(fault, monkeypatch):
     machine = line(*SPUR)
     run = run_of(machine, fault, specimen=specimen_of(machine), with_mesh_state=True)
     (three,) = recorded(run)
-    monkeypatch.setattr(LineDynamics, "has_chords", True)
+    monkeypatch.setattr(machine_lanes, "MOST_CONTACT_RATIO", 0.0)
     (many,) = recorded(run)
     assert three.acceleration.tobytes() != many.acceleration.tobytes()
     found, expected = (each.acceleration[None] for each in (many, three))

@@ -7,7 +7,7 @@ import pytest
 from fault_cases import one
 from stacked_motions import exact_motions, integrate
 
-from gensig.dynamics.backends.nystroem import method
+from gensig.dynamics.backends.nystroem import machine_lanes
 from gensig.dynamics.decimation import in_band_error
 from gensig.dynamics.integrator import Solver
 from gensig.faults.broken import MissingTooth
@@ -73,7 +73,7 @@ class TestSpurPairsOfAnyContactRatio:
 
     @pytest.mark.parametrize("precision", ["float64", "float32"])
     def test_motions(self, machine, dynamics_of, pairs, precision, monkeypatch):
-        monkeypatch.setattr(method, "MOST_CONTACT_RATIO", 0.0)
+        monkeypatch.setattr(machine_lanes, "MOST_CONTACT_RATIO", 0.0)
         exact = reference(pairs, FINE)
         found = motions(pairs, 5, precision=precision)
         assert error(found, exact).max() < 1e-3
@@ -84,7 +84,7 @@ class TestSpurPairsOfAnyContactRatio:
 
     def test_they_are_followed_by_that_core(self, pairs, monkeypatch):
         three = motions(pairs, 8)
-        monkeypatch.setattr(method, "MOST_CONTACT_RATIO", 0.0)
+        monkeypatch.setattr(machine_lanes, "MOST_CONTACT_RATIO", 0.0)
         more = motions(pairs, 8)
         assert three.acceleration.tobytes() != more.acceleration.tobytes()
         assert error(more, three).max() < 1e-3

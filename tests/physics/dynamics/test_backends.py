@@ -13,7 +13,6 @@ from gensig.dynamics.integrator import (
     Solver,
     check_machine,
     records_together,
-    settling_time,
 )
 from gensig.errors import ConfigError, SimulationError
 from gensig.systems.base import simulate_together
@@ -67,7 +66,7 @@ def motion(machine, integration):
     first = -margin * factor - 1
     last = (integration.n_samples + margin) * factor
     times = np.arange(first, last + 1) / (rate * factor)
-    begin = times[0] - settling_time(machine)
+    begin = times[0] - machine.settling_time
     slope = equations(machine)[0]
     start = at_rest(machine, begin)
     states = solved(slope, start, np.append(begin, times), "LSODA", 1e-7)[1:]

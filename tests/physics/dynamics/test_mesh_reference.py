@@ -9,7 +9,7 @@ from fault_cases import one
 from lane_tools import laws, motion_of, right_hand_side
 
 from gensig.dynamics._layout import DAMPING
-from gensig.dynamics.lanes import pair_numbers
+from gensig.dynamics.lanes import mesh_numbers
 from gensig.faults.broken import MissingTooth
 
 CRACK = one("crack", tooth=2, crack_depth_mm=2)
@@ -71,7 +71,9 @@ class Reference:
         self.pair = dynamics.table.pair
         self.system = dynamics.system()
         self.shared = self.table.shared_compliance
-        self.damping = pair_numbers(dynamics, 1e-6, dynamics.rest())[DAMPING]
+        self.damping = mesh_numbers(dynamics.equations.meshes[0], dynamics.rest, 1e-6)[
+            DAMPING
+        ]
 
     def present(self, index):
         """Pairs whose teeth exist, (pair,)."""

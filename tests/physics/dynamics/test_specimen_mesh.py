@@ -8,7 +8,7 @@ from closeness import assert_close
 from fault_cases import GEARS, one
 
 from gensig.dynamics._layout import BACKLASH
-from gensig.dynamics.lanes import pair_numbers
+from gensig.dynamics.lanes import mesh_numbers
 from gensig.faults.flank_form import ProfileError
 from gensig.sensing.manufacturing import draw_specimen, perfect_specimen
 from gensig.systems.base import simulate_together
@@ -157,7 +157,9 @@ def test_drawn_backlash_needs_no_further_tables(xiamen, perfect):
     for factor in (1.0, 1.2):
         dynamics = dynamics_with(xiamen, replace(perfect, backlash_factor=factor))
         assert dynamics.table.pinion is xiamen.mesh_table().pinion
-        backlash = pair_numbers(dynamics, 1e-6, dynamics.rest())[BACKLASH]
+        backlash = mesh_numbers(dynamics.equations.meshes[0], dynamics.rest, 1e-6)[
+            BACKLASH
+        ]
         assert_close(backlash, factor * 80 * UM, 1e-9)
 
 

@@ -5,11 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gensig.dynamics.backends.group_run import GroupRun
-from gensig.dynamics.backends.nystroem.method import (
-    ANY_LAW,
-    THREE_PAIRS,
-    is_followed_by_three,
-)
+from gensig.dynamics.backends.nystroem import method
+from gensig.dynamics.backends.nystroem.machine_lanes import group_kind
 from gensig.dynamics.lanes import fill_lanes
 from gensig.faults.broken import MissingTooth
 from gensig.systems.base import simulate_together
@@ -71,7 +68,7 @@ def assert_independent(runs, orders):
 
 def core_of(machine):
     """The core that integrates a machine."""
-    return THREE_PAIRS if is_followed_by_three(machine.teeth) else ANY_LAW
+    return method.core_of(group_kind(machine.equations))
 
 
 class CoreRun(GroupRun):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from core_runs import MISSING, PAPER, CoreRun
 
-from gensig.dynamics.backends.nystroem.method import ANY_LAW, is_followed_by_three
+from gensig.dynamics.backends.nystroem.machine_lanes import is_followed_by_three
+from gensig.dynamics.backends.nystroem.method import ANY_LAW
 from gensig.faults.broken import MissingTooth
 from gensig.plan.request import read_request
 from gensig.systems.pair_machine import pair_dynamics

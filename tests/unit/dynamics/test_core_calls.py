@@ -8,7 +8,7 @@ from lane_tools import with_teeth
 
 from gensig.dynamics._record_kernels import BLOCK
 from gensig.dynamics._vector import LANES, n_lanes
-from gensig.dynamics.backends.nystroem._pair_kernels import RECENTER
+from gensig.dynamics.backends.nystroem._kernels import RECENTER
 from gensig.dynamics.decimation import decimator
 from gensig.faults.broken import MissingTooth
 

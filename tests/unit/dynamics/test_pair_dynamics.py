@@ -17,7 +17,6 @@ from gensig.dynamics.integrator import (
     check_machine,
     check_memory,
     integrate,
-    settling_time,
 )
 from gensig.dynamics.pair import solid_disc
 from gensig.errors import ConfigError, SimulationError
@@ -109,7 +108,7 @@ def test_settling_follows_the_slowest_motion_up_to_a_limit(machine, dynamics_of)
         (QUICK, decay / 20),
     ):
         assert_close(
-            settling_time(dynamics_of(machine(changes))),
+            dynamics_of(machine(changes)).settling_time,
             expected,
             1e-3,
         )

@@ -103,7 +103,7 @@ def drive_matrices(dynamics):
 def residual(dynamics, time, q):
     """Remaining forces and torques at a state at rest in the rotating frame, (dof,)."""
     system = dynamics.system()
-    nominal = dynamics.nominal(np.array([time]))
+    nominal = dynamics.operating.nominal(np.array([time]))
     radius = dynamics.table.pair.pinion.base_radius
     direction = dynamics.approach_direction()
     states = dynamics.teeth.states(

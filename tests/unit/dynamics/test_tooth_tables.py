@@ -9,7 +9,7 @@ from lane_tools import laws
 
 from gensig.dynamics import lanes
 from gensig.dynamics._vector import LANES, n_lanes
-from gensig.dynamics.lanes import pack
+from gensig.dynamics.backends.nystroem.machine_lanes import missing_cells, pack
 from gensig.faults.broken import MissingTooth
 
 LAWS = {
@@ -66,20 +66,22 @@ def both_layouts(make, monkeypatch):
 def test_many_products_are_stored_tooth_by_tooth(xiamen, dynamics_of, dynamics):
     per_row = LANES * 4 * dynamics.table.position.size
     few = dynamics_of(xiamen, PITS[:5])
-    assert len(pack([few], 1e-6).table) == per_row * 6
-    assert len(pack([dynamics], 1e-6).table) == per_row * (N_PINION + N_WHEEL)
+    end = len(missing_cells())
+    assert len(pack([few], 1e-6).table) == per_row * 6 + end
+    n_rows = N_PINION + N_WHEEL
+    assert len(pack([dynamics], 1e-6).table) == per_row * n_rows + end
 
 
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 def test_every_pair_of_teeth_has_the_sum_of_its_tables(
     dynamics, precision, monkeypatch
 ):
-    """Compliance, gap and slopes at every node; what a core adds stands after the last lane's."""
+    """Compliance, gap and slopes at every node; a missing pair stands after the last lane's."""
     monkeypatch.setattr(lanes, "MOST_PAIRS", np.inf)
-    table, end = dynamics.table, np.array([1.0, 2.0, 3.0])
-    packed = pack([dynamics], 1e-6, precision, end=end).table
+    table, end = dynamics.table, missing_cells()
+    packed = pack([dynamics], 1e-6, precision).table
     teeth = lanes.tooth_rows(table)
-    values = packed[:-3].reshape(n_lanes(precision), -1, table.position.size, 4)
+    values = packed[: -len(end)].reshape(n_lanes(precision), -1, table.position.size, 4)
     sound = np.arange(84) != 20
     for column, name in enumerate(
         ("compliance", "compliance_slope", "gap", "gap_slope")
@@ -94,7 +96,7 @@ def test_every_pair_of_teeth_has_the_sum_of_its_tables(
                 expected = pinion[tooth] + wheel[sound]
                 np.testing.assert_array_equal(result[row], expected.astype(precision))
     assert teeth.row[23 + 20] == -1
-    np.testing.assert_array_equal(packed[-3:], end)
+    np.testing.assert_array_equal(packed[-len(end) :], end.astype(precision))
 
 
 def test_both_layouts_give_one_law_and_motion(dynamics, motions, monkeypatch):

@@ -14,7 +14,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from refusals import refused
 
 from gensig.dynamics.bearing import support_stiffness
-from gensig.dynamics.integrator import settling_time
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.inputs import InputReader
@@ -265,7 +264,7 @@ class TestRecords:
             operating = run.system.operating
             decay = operating.drive_frequency * operating.drive_damping_ratio
             expected = math.log(1e4) / (tau * decay)
-            assert_close(settling_time(pair_dynamics(run)), expected, 1e-3)
+            assert_close(pair_dynamics(run).settling_time, expected, 1e-3)
 
 
 def test_axial_and_tilt_supports_are_as_given_where_they_are(config_with):

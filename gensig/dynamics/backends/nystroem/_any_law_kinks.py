@@ -8,7 +8,6 @@ Simpson's rule misses of either is that of ``_kinks``.
 from __future__ import annotations
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._equations import N_IN_PLANE, dofs_of_gears
 from gensig.dynamics._layout import MIDDLE, MOST_PAIRS, followed, pair_rows
 from gensig.dynamics._mesh_kernels import rubbed
 from gensig.dynamics._vector import (
@@ -27,10 +26,8 @@ from gensig.dynamics._written import written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._kinks import (
     LEAST_DAMPED,
-    add_force,
     crosses_zero,
     missed_moments,
-    push_gears,
 )
 from gensig.dynamics.backends.nystroem._layout import (
     ANY_DAMPED,
@@ -239,16 +236,6 @@ def _switch(group, j, changed, approach, first, last, work):
     _add(j, per_share, short, early, changed, work)
 
 
-@compiled
-def correct(group, h, approach, first, last, mean, v, q, work):
-    """Add to the end of the step what its kinks change, in the lanes with any.
-
-    ``approach`` is that in the middle of the step.
-    """
-    miss(group, approach, first, last, work)
-    push_missed(group, h, first, last, mean, v, q, work)
-
-
 @inlined
 def miss(group, approach, first, last, work):
     """Set what Simpson's rule misses of the force of every pair, and mark lanes with any."""
@@ -273,30 +260,6 @@ def miss_nothing(first, last, work):
     for k in range(first, last):
         set_row(work, ANY_SHORT + k, zero)
         set_row(work, ANY_EARLY + k, zero)
-
-
-@inlined
-def push_missed(group, h, first, last, mean, v, q, work):
-    """Add to the end of the step what is missed, in the lanes that are marked."""
-    changed = get_row(work, rows.ANY_MISSED)
-    _push(group, ANY_SHORT, first, last, 1.0, changed, mean, work)
-    _push(group, ANY_SHORT, first, last, h, changed, v, work)
-    _push(group, ANY_EARLY, first, last, h * h, changed, q, work)
-
-
-@inlined
-def _push(group, forces, first, last, by, changed, target, work):
-    """Add accelerations by pair forces, times a number, to rows of the motions of the gears."""
-    law = missed_law(group, forces, first, last, work)
-    _push_gears(group, law, by, changed, target, work)
-
-
-@written
-def _push_gears(group, law, by, changed, target, work):
-    push_gears(group, law, by, changed, target, work)
-    for d in range(N_IN_PLANE, dofs_of_gears(group)):
-        along = 0.0 - get_row(group.reach, d) * law.normal
-        add_force(group, d, along, by, changed, target, work)
 
 
 @inlined

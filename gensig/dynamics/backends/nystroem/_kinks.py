@@ -7,11 +7,9 @@ and end of the step. The force is its positive part, whose moments Simpson's rul
 from __future__ import annotations
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._equations import P_TURN, P_X, P_Y, W_TURN, W_X, W_Y
 from gensig.dynamics._vector import (
     any_above,
     chosen,
-    compiled,
     get_row,
     inlined,
     set_row,
@@ -195,9 +193,9 @@ def miss(numbers, changed, work):
 
 
 @written
-def missed_law(group, forces, work):
+def missed_law(mesh, forces, work):
     """The law of pair forces in the middle of the step, of which nothing is damped or stored."""
-    numbers = group.numbers
+    numbers = mesh.numbers
     zero = spread(work, 0.0)
     normal, rubbed, turned, along = zero, zero, zero, zero
     for j in range(FOLLOWED):
@@ -206,52 +204,16 @@ def missed_law(group, forces, work):
         normal, rubbed = normal + force, rubbed + slid
         turned = turned + slid * arm(numbers, get_row(work, pair + rows.PLACE))
         along = along + force * get_row(work, pair + rows.GAP_SLOPE)
-    along = chosen(group.consistent, along, zero)
+    along = chosen(mesh.consistent, along, zero)
     coefficient = get_row(numbers, layout.FRICTION)
     friction, moment = coefficient * rubbed, coefficient * turned
     moment_w = get_row(numbers, layout.TANGENT_LENGTH) * friction - moment
     return layout.Law(normal, friction, 0.0 - moment, moment_w, along, zero, zero, zero)
 
 
-@compiled
-def correct(group, h, changed, mean, v, q, work):
-    """Add to the end of the step what its kinks change, in the lanes with any.
-
-    ``changed`` holds for every pair 1 where it has a kink. Other loaded pairs give way.
-    """
-    miss(group.numbers, changed, work)
-    any_changed = changed[0] + changed[1] + changed[2]
-    _push(group, rows.SHORT, 1.0, any_changed, mean, work)
-    _push(group, rows.SHORT, h, any_changed, v, work)
-    _push(group, rows.EARLY, h * h, any_changed, q, work)
-
-
 @written
-def _push(group, forces, by, changed, target, work):
-    """Add accelerations by pair forces, times a number, to rows of the plane motions."""
-    law = missed_law(group, forces, work)
-    push_gears(group, law, by, changed, target, work)
-
-
-@written
-def push_gears(group, law, by, changed, target, work):
-    """Add accelerations by a law, times a number, to rows of the plane motions."""
-    numbers = group.numbers
-    radius_p = get_row(numbers, layout.PINION_RADIUS)
-    radius_w = get_row(numbers, layout.WHEEL_RADIUS)
-    on_p = radius_p * (law.along - law.normal) + law.moment_p
-    on_w = radius_w * law.normal + law.moment_w
-    add_force(group, P_X, law.friction, by, changed, target, work)
-    add_force(group, P_Y, law.normal, by, changed, target, work)
-    add_force(group, P_TURN, on_p, by, changed, target, work)
-    add_force(group, W_X, 0.0 - law.friction, by, changed, target, work)
-    add_force(group, W_Y, 0.0 - law.normal, by, changed, target, work)
-    add_force(group, W_TURN, on_w, by, changed, target, work)
-
-
-@written
-def add_force(group, d, force, by, changed, target, work):
+def add_force(group, d, force, by, changed, row, machine):
     """Add the acceleration of a degree of freedom by a force, times a number, to a row."""
-    zero, old = spread(work, 0.0), get_row(work, target + d)
+    zero, old = spread(machine, 0.0), get_row(machine, row)
     new = old + by * (force * get_row(group.inverse_mass, d))
-    set_row(work, target + d, where_above(changed, zero, new, old))
+    set_row(machine, row, where_above(changed, zero, new, old))

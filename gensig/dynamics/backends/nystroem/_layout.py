@@ -1,17 +1,13 @@
 """Row names of the scratch of the two-evaluation core.
 
-The scratch begins with the rows of ``gensig.dynamics._layout``, of which the back flanks use
-some. Rows follow for the pairs, for what the step remembers, and for the machine.
+The scratch of a mesh begins with the rows of ``gensig.dynamics._layout``, of which the back flanks
+use some. Rows follow for the pairs and for what the step remembers. Those of the machine are behind
+the rows of all meshes, a block for each degree of freedom.
 """
 
 from __future__ import annotations
 
-import numpy as np
-
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._layout import Group, HelicalGroup, is_helical
-from gensig.dynamics._vector import n_lanes
-from gensig.dynamics._written import written
 
 # N/m: rows hold compliances times this number, which are about 1
 PER_COMPLIANCE = 2.0**27
@@ -53,12 +49,11 @@ N_FIXED = ANY_EARLY + layout.MOST_PAIRS
 # rows of a pair of helical teeth in the slot ``PART``, which this core has no other use for: what
 # another chord adds to its force and to its stiffness at the begin of the step, and the penetration
 MORE_FORCE, MORE_STIFFNESS, BITTEN = layout.COMPLIANCE, layout.STIFFNESS, layout.GAP
-# blocks of rows per degree of freedom behind them, two gears and two rotors at most: constants
-# are faster than the number of a machine
-MOST_DOFS, MOST_HELICAL_DOFS = 8, 14
+# rows of a degree of freedom
 Q, V, MIDDLE_Q, MIDDLE_V, END_Q, END_V = range(6)
-# accelerations at begin and middle of the last step and at its end, other forces, means
-BEFORE, HALFWAY, NOW, FORCES, MEAN, N_BLOCKS = range(6, 12)
+# accelerations at begin and middle of the last step and at its end, forces that follow time alone,
+# mean acceleration over the step, and the sum of all forces
+BEFORE, HALFWAY, NOW, FORCES, MEAN, ON, N_BLOCKS = range(6, 13)
 
 # float64 rows behind those of ``gensig.dynamics._layout``: position and number of every pair,
 # its tables' first indices, and numbers of the tables
@@ -75,46 +70,3 @@ MARGINS_OF = layout.N_COUNTS
 # 1 in its first place if a pair or a chord changes in the step
 RECHOSEN = MARGINS_OF + 1
 N_COUNTS = RECHOSEN + 1
-
-
-class NystroemGroup(Group):
-    """Spur gears of the one-sided law, for the two-evaluation core.
-
-    The table ends with one cell of a missing pair and one cell of zeros.
-    """
-
-
-class AnyLawGroup(Group):
-    """Spur gears of any law and contact ratio, for the two-evaluation core."""
-
-
-class HelicalNystroemGroup(HelicalGroup):
-    """Helical gears, for the two-evaluation core."""
-
-
-@written
-def most_dofs(group):
-    """Rows of a block of the machine; a constant of the compiled code."""
-    return MOST_HELICAL_DOFS if is_helical(group) else MOST_DOFS
-
-
-@written
-def block(name, n_dofs):
-    """First row of a block of the machine, in blocks of so many rows."""
-    return N_FIXED + name * n_dofs
-
-
-def scratch(n_dof, n_channels, precision="float64"):
-    """Work rows, float64 rows and integer rows of ``integrate``."""
-    n = n_lanes(precision)
-    work = np.zeros((N_FIXED + N_BLOCKS * MOST_DOFS) * n, dtype=precision)
-    return work, np.zeros(N_WIDE * n), np.zeros(1, dtype=np.int64)
-
-
-def any_law_scratch(n_dof, n_channels, precision="float64"):
-    """Work rows, float64 rows and integer rows of ``_any_law_pair.integrate``."""
-    n = n_lanes(precision)
-    n_blocks = N_BLOCKS * MOST_HELICAL_DOFS
-    work = np.zeros((N_FIXED + n_blocks) * n, dtype=precision)
-    near = np.zeros((N_COUNTS, n), dtype=np.int64)
-    return work, np.zeros(layout.N_WIDE * n), near.ravel()

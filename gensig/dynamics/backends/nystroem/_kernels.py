@@ -1,7 +1,10 @@
-"""Two-evaluation core for machines of several meshes: loops over meshes and degrees of freedom.
+"""Two-evaluation core: fixed steps of a method of Nystroem, several records side by side.
 
-The machine is here. What a mesh reads, how it pushes and what its kinks miss are functions that
-``line_integrator`` takes: of ``_line_spur_meshes`` and of ``_line_chord_meshes``.
+Every number of a record lies in its own lane of a vector, and no instruction mixes lanes or
+reorders sums: a record's bits depend on nothing but its own numbers. Arrays are flat; a row holds
+one number for every record of the group. The machine is here, in loops over meshes and degrees of
+freedom. What a mesh reads, how it pushes and what its kinks miss are functions that
+``integrator`` takes: of ``_spur_meshes`` and of ``_any_law_meshes``.
 """
 
 from __future__ import annotations
@@ -24,22 +27,23 @@ from gensig.dynamics._vector import (
     width,
 )
 from gensig.dynamics.backends.nystroem import _layout as rows
-from gensig.dynamics.backends.nystroem import _line_layout as lines
-from gensig.dynamics.backends.nystroem._flat import number_at
-from gensig.dynamics.backends.nystroem._line_course import (
+from gensig.dynamics.backends.nystroem._course import (
     drive,
     profile_rows,
     set_forces,
     set_rolls,
 )
-from gensig.dynamics.backends.nystroem._line_layout import (
+from gensig.dynamics.backends.nystroem._flat import number_at
+from gensig.dynamics.backends.nystroem._group import (
     machine_rows,
     mesh_of,
     mesh_rows,
+    meshes_of,
     of,
 )
-from gensig.dynamics.backends.nystroem._line_meshes import (
+from gensig.dynamics.backends.nystroem._meshes import (
     acceleration,
+    choose,
     couple,
     damp,
     govern,
@@ -52,10 +56,11 @@ from gensig.dynamics.backends.nystroem._motion import (
     predict,
     to_middle,
 )
-from gensig.dynamics.backends.nystroem._pair_kernels import RECENTER, choose
+
+RECENTER = 256  # steps between two removals of the drift of the rotations, to keep numbers small
 
 
-def line_integrator(
+def integrator(
     *,
     begin_mesh: Any,
     start_mesh: Any,
@@ -66,7 +71,7 @@ def line_integrator(
     end_mesh: Any,
     keep_mesh: Any,
 ) -> Any:
-    """The core of lines whose meshes have one law.
+    """The core of machines whose meshes have one law.
 
     Each function is one of compiled code, for one mesh: at the begin of a call, at the start of
     its fresh lanes, for the output, at the begin of a step, in its middle, at its end, after it,
@@ -77,9 +82,9 @@ def line_integrator(
     def start(group, slot, fresh, by_tooth, time, work, wide, near):
         """Set what the step remembers in the lanes that are fresh, from one evaluation there."""
         n = width(work)
-        machine = machine_rows(work, group.n_meshes, n)
+        machine = machine_rows(work, meshes_of(group), n)
         pull_at_begin(group, time, machine, wide)
-        for m in range(group.n_meshes):
+        for m in range(meshes_of(group)):
             start_mesh(group, m, slot, fresh, by_tooth, machine, work, wide, near)
         for lane in range(n):
             machine[at(rows.FRESH, lane, n)] = fresh[lane]
@@ -111,7 +116,7 @@ def line_integrator(
         angles, ``seen`` the rows of every mesh.
         """
         n = width(work)
-        n_dof, n_meshes = len(group.force) // n, group.n_meshes
+        n_dof, n_meshes = len(group.force) // n, meshes_of(group)
         n_channels = len(channels) if out_row >= 0 else 0
         machine = machine_rows(work, n_meshes, n)
         begin(group, step, state, work)
@@ -138,7 +143,7 @@ def line_integrator(
                     group, m, slot, next_slot, step, by_tooth, machine, work, wide, near
                 )
             for d in range(n_dof):
-                moved, rate = to_middle(d * lines.N_BLOCKS, step, 1, machine)
+                moved, rate = to_middle(d, step, machine)
                 own_pull(group, d, moved, rate, machine)
             couple(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
             if len(group.damper_other) > 0:
@@ -150,7 +155,7 @@ def line_integrator(
                 push_middle(group, m, step, machine, work, wide, near)
             for d in range(n_dof):
                 a = acceleration(group, d, machine)
-                moved, rate = predict(d * lines.N_BLOCKS, a, step, 1, machine)
+                moved, rate = predict(d, a, step, machine)
                 own_pull(group, d, moved, rate, machine)
             couple(group, rows.END_Q, rows.END_V, machine)
             if len(group.damper_other) > 0:
@@ -162,7 +167,7 @@ def line_integrator(
                 push_end(group, m, next_slot, step, machine, work, wide, near)
             for d in range(n_dof):
                 a = acceleration(group, d, machine)
-                conclude(d * lines.N_BLOCKS, a, step, 1, machine)
+                conclude(d, a, step, machine)
             for m in range(n_meshes):
                 end_mesh(group, m, next_slot, step, machine, work, near)
             out_first = (out_row + number - first_step) * n_channels
@@ -182,7 +187,7 @@ def has_teeth_apart(group, n):
     """True if a mesh of any lane stores its teeth one by one."""
     by_tooth = False
     for lane in range(n):
-        for m in range(group.n_meshes):
+        for m in range(meshes_of(group)):
             wheel_rows = at(m * layout.N_INDICES + layout.WHEEL_ROWS, lane, n)
             by_tooth = by_tooth or group.indices[wheel_rows] > 0
     return by_tooth
@@ -201,7 +206,7 @@ def count_lost(lost, m, own):
 def begin(group, step, state, work):
     """Set the rows that stay as they are, and those of the state."""
     n = width(work)
-    n_dof, n_meshes = len(group.force) // n, group.n_meshes
+    n_dof, n_meshes = len(group.force) // n, meshes_of(group)
     machine = machine_rows(work, n_meshes, n)
     for d in range(n_dof):
         set_row(machine, of(rows.Q, d), get_row(state, d))
@@ -232,7 +237,7 @@ def begin_step(group, number, is_first, step, machine, wide):
     is_recentred = number % RECENTER == 0
     if is_recentred:
         recenter(group, machine, wide)
-    set_rolls(group, number * step, machine, wide)
+    set_rolls(group, number * step, rows.Q, machine, wide)
     is_changing = len(group.profile) > profile_rows(group, n) * n
     if is_changing or is_recentred or is_first:
         set_forces(group, number * step, machine, wide)

@@ -1,16 +1,27 @@
-"""Meshes of a line of which some are helical or of high contact ratio.
+"""Meshes of any law: chords of helical teeth, up to eight pairs in contact, the paper's law.
 
-Law, tables and kinks are those of ``_any_law_pair``; spur teeth have one chord.
+The tables are read where a step will end, by its accelerations. The middle of a step takes the mean
+of the tables at its begin and end; a slot that the roll misses by some 1e-10 m is moved by the
+slopes. Spur teeth among helical ones have one chord.
 """
 
 from __future__ import annotations
 
 from gensig.dynamics import _layout as layout
 from gensig.dynamics import _slots
-from gensig.dynamics._layout import AHEAD, MIDDLE, PART
+from gensig.dynamics._layout import (
+    AHEAD,
+    BASE,
+    MIDDLE,
+    PART,
+    ROLL,
+    is_helical,
+    span_index,
+)
 from gensig.dynamics._mesh_kernels import mesh_law
 from gensig.dynamics._record_kernels import integrates
-from gensig.dynamics._slots import keep_begin, near_pairs
+from gensig.dynamics._slots import keep_begin, near_pairs, roll_ahead
+from gensig.dynamics._tables import between, chords_between, cover, gather
 from gensig.dynamics._vector import (
     any_above,
     at,
@@ -23,9 +34,7 @@ from gensig.dynamics._vector import (
     width,
 )
 from gensig.dynamics._written import written
-from gensig.dynamics.backends.nystroem import _any_law_pair as any_law
 from gensig.dynamics.backends.nystroem import _layout as rows
-from gensig.dynamics.backends.nystroem import _line_layout as lines
 from gensig.dynamics.backends.nystroem._any_law_kinks import (
     begin_again,
     count_anew,
@@ -35,58 +44,123 @@ from gensig.dynamics.backends.nystroem._any_law_kinks import (
     miss,
     missed_law,
 )
-from gensig.dynamics.backends.nystroem._chord_kinks import miss_chords
-from gensig.dynamics.backends.nystroem._layout import END_AT, MIDDLE_AT
-from gensig.dynamics.backends.nystroem._line_kernels import line_integrator
-from gensig.dynamics.backends.nystroem._line_layout import (
-    ChordLineGroup,
-    chord_mesh_of,
+from gensig.dynamics.backends.nystroem._chord_kinks import miss_chords, read_again
+from gensig.dynamics.backends.nystroem._group import (
+    AnyLawPairGroup,
+    ChordGroup,
+    HelicalPairGroup,
     integer_rows,
+    mesh_of,
     mesh_rows,
-    of,
     wide_rows,
 )
-from gensig.dynamics.backends.nystroem._line_meshes import (
+from gensig.dynamics.backends.nystroem._kernels import integrator
+from gensig.dynamics.backends.nystroem._layout import END_AT, MIDDLE_AT
+from gensig.dynamics.backends.nystroem._meshes import (
+    choose,
     correct_by,
+    mean_speed,
     motion,
     push,
-    ratio,
     rolled,
-    touched,
+    set_begun,
     turning_speed,
 )
-from gensig.dynamics.backends.nystroem._pair_kernels import choose
+
+
+@inlined
+def _look_ahead(mesh, step, approach, rate, work):
+    """Set how near pairs are that may touch in the step, and what chords are chosen by."""
+    margin = spread(work, layout.NEAR if mesh.one_sided else 2.0 * layout.FAR)
+    set_row(work, layout.WITHIN, approach + margin)
+    if is_helical(mesh):
+        bent = get_row(mesh.numbers, layout.SHARED) * get_row(work, layout.LAST_TOTAL)
+        set_row(work, layout.LOCAL, approach + (0.5 * step) * rate - bent)
+
+
+@inlined
+def _read_begin(mesh, slot, fresh, step, approach, rate, work, wide, near):
+    """Read the tables at the begin of the first step of a call; lanes that go on keep chords."""
+    n = width(work)
+    for lane in range(n):
+        work[at(layout.FLAGS, lane, n)] = fresh[lane]
+        if fresh[lane] > 0.0:
+            wide[at(ROLL + slot, lane, n)] = wide[at(BASE, lane, n)]
+            mean_force = mesh.numbers[at(layout.MEAN_FORCE, lane, n)]
+            work[at(layout.LAST_TOTAL, lane, n)] = mean_force
+    _look_ahead(mesh, step, approach, rate, work)
+    set_row(work, AHEAD + slot, spread(work, 0.0))
+    gather(mesh, slot, True, work, wide, near)
+
+
+@inlined
+def _set_ahead(slot, work, wide):
+    """Set the roll of a slot since the begin of the step, in the precision of the scratch."""
+    n = width(work)
+    for lane in range(n):
+        ahead = wide[at(ROLL + slot, lane, n)] - wide[at(BASE, lane, n)]
+        work[at(AHEAD + slot, lane, n)] = ahead
+
+
+@inlined
+def _keep_near(first, last, n, near):
+    """Keep which pairs come near in the step; no step of this core has parts."""
+    span = span_index(PART, n)
+    near[span + layout.FIRST_NEAR_PAIR] = first
+    near[span + layout.LAST_NEAR_PAIR] = last
+
+
+@compiled
+def _read_slots(mesh, slot, next_slot, approach, work, wide, near):
+    """Read the tables where ``AHEAD`` of the next slot says, and keep which pairs come near."""
+    n = width(work)
+    roll_ahead(next_slot, work, wide)
+    set_row(work, layout.FLAGS, spread(work, 1.0))
+    rechosen = gather(mesh, next_slot, True, work, wide, near)
+    near[rows.RECHOSEN * n] = rechosen
+    if rechosen:
+        read_again(mesh, slot, approach, work, wide, near)
+    first, last = near_pairs(slot, n, near)
+    first_end, last_end = near_pairs(next_slot, n, near)
+    first, last = min(first, first_end), max(last, last_end)
+    cover(slot, first, last, work, near)
+    cover(next_slot, first, last, work, near)
+    _set_ahead(slot, work, wide)
+    between(slot, next_slot, MIDDLE, first, last, work)
+    if is_helical(mesh):
+        chords_between(slot, next_slot, MIDDLE, first, last, work)
+    _keep_near(first, last, n, near)
 
 
 @compiled
 def begin_mesh(group, m, slot, fresh, step, machine, work, wide, near):
     """Read the tables of a mesh at the begin of the first step of a call."""
     n = width(work)
-    mesh, own = chord_mesh_of(group, m, n), mesh_rows(work, m, n)
+    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
     own_wide, counts = wide_rows(wide, m, n), integer_rows(near, m, n)
     for lane in range(n):
         if fresh[lane] > 0.0:
             counts[at(layout.NEWEST, lane, n)] = layout.NO_PAIR
     approach, rate = motion(group, m, rows.Q, rows.V, machine)
-    any_law.read_begin(mesh, slot, fresh, step, approach, rate, own, own_wide, counts)
+    _read_begin(mesh, slot, fresh, step, approach, rate, own, own_wide, counts)
 
 
 @inlined
 def start_mesh(group, m, slot, fresh, by_tooth, machine, work, wide, near):
     """Push by a mesh at the begin of a step, and set what it remembers where it is fresh."""
     n = width(work)
-    mesh, own = chord_mesh_of(group, m, n), mesh_rows(work, m, n)
+    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
     own_wide, counts = wide_rows(wide, m, n), integer_rows(near, m, n)
     for lane in range(n):
         own[at(rows.FRESH, lane, n)] = fresh[lane]
-    any_law.set_ahead(slot, own, own_wide)
-    _set_begun(group, m, machine, own)
+    _set_ahead(slot, own, own_wide)
+    set_begun(group, m, machine, own)
     # what the other lanes remember waits in other rows
     set_row(own, rows.ANY_EARLY, get_row(own, rows.NORMAL))
     for k in range(layout.MOST_PAIRS):
         set_row(own, rows.ANY_SHORT + k, get_row(own, layout.PAIR_FORCE + k))
     first, last = near_pairs(slot, n, counts)
-    any_law.keep_near(first, last, n, counts)
+    _keep_near(first, last, n, counts)
     push_mesh(group, m, slot, END_AT, 0.0, rows.Q, rows.V, machine, work, wide, near)
     count_anew(mesh, own, counts)
     _keep_others(rows.NORMAL, rows.ANY_EARLY, own)
@@ -115,32 +189,15 @@ def _keep_others(row, kept, own):
 def read_mesh(group, m, slot, next_slot, step, by_tooth, machine, work, wide, near):
     """Read the tables of a mesh at the end of the step, and set those in its middle."""
     n = width(work)
-    mesh, own = chord_mesh_of(group, m, n), mesh_rows(work, m, n)
+    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
     own_wide, counts = wide_rows(wide, m, n), integer_rows(near, m, n)
     approach, rate = motion(group, m, rows.Q, rows.V, machine)
-    any_law.look_ahead(mesh, step, approach, rate, own)
+    _look_ahead(mesh, step, approach, rate, own)
     ahead = step * get_row(mesh.numbers, layout.PINION_RADIUS)
-    ahead = ahead * _mean_speed(group, m, step, machine)
+    ahead = ahead * mean_speed(group, m, step, machine)
     set_row(own, AHEAD + next_slot, ahead)
-    any_law.read_slots(mesh, slot, next_slot, approach, own, own_wide, counts)
-    _set_begun(group, m, machine, own)
-
-
-@written
-def _set_begun(group, m, machine, own):
-    """Keep the rotation of gear a at the begin of the step."""
-    turned = of(rows.Q, touched(group, m, lines.A_TURN))
-    set_row(own, lines.BEGUN, get_row(machine, turned))
-
-
-@written
-def _mean_speed(group, m, step, machine):
-    """Speed of gear a in the middle of the step, with every force at its begin, rad/s."""
-    zero = spread(machine, 0.0)
-    turned = of(rows.NOW, touched(group, m, lines.A_TURN))
-    gain = ratio(group, m, machine) * get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
-    gain = gain + get_row(machine, turned)
-    return turning_speed(group, m, rows.V, zero, machine) + (0.5 * step) * gain
+    _read_slots(mesh, slot, next_slot, approach, own, own_wide, counts)
+    set_begun(group, m, machine, own)
 
 
 @compiled
@@ -150,7 +207,7 @@ def push_mesh(group, m, slot, instant, since, q, v, machine, work, wide, near):
     The state is in the blocks ``q`` and ``v``. Forces and margins at the instant are kept.
     """
     n = width(work)
-    mesh, own = chord_mesh_of(group, m, n), mesh_rows(work, m, n)
+    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
     first, last = near_pairs(PART, n, integer_rows(near, m, n))
     for k in range(layout.MOST_PAIRS):
         set_row(own, layout.PAIR_FORCE + k, spread(work, 0.0))
@@ -195,21 +252,22 @@ def push_end(group, m, slot, step, machine, work, wide, near):
 def end_mesh(group, m, slot, step, machine, work, near):
     """Correct the end of the step for the kinks of a mesh, and shift what it remembers."""
     n = width(work)
-    mesh, own = chord_mesh_of(group, m, n), mesh_rows(work, m, n)
+    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
     counts, zero = integer_rows(near, m, n), spread(work, 0.0)
     first, last = near_pairs(PART, n, counts)
     changed = zero
     for k in range(first, last):
         changed = changed + kinked(mesh, k, own)
     if any_above(changed, zero):
-        # the approach counts under the paper's law alone, which drive lines do not have
-        miss(mesh, zero, first, last, own)
+        halfway, _ = motion(group, m, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
+        miss(mesh, halfway, first, last, own)
         _correct(group, mesh, m, step, first, last, machine, own)
-    if counts[rows.RECHOSEN * n]:
+    if is_helical(group) and counts[rows.RECHOSEN * n]:
         approach, _ = motion(group, m, rows.END_Q, rows.END_V, machine)
         miss_chords(mesh, slot, approach, first, last, own)
         _correct(group, mesh, m, step, first, last, machine, own)
-    set_row(own, layout.LAST_TOTAL, get_row(own, layout.TOTAL))
+    if is_helical(group):
+        set_row(own, layout.LAST_TOTAL, get_row(own, layout.TOTAL))
     begin_again(mesh, first, last, own)
 
 
@@ -230,7 +288,7 @@ def keep_mesh(m, work, wide, near):
     keep_begin(own, own_wide, integer_rows(near, m, n))
 
 
-integrate = line_integrator(
+integrate = integrator(
     begin_mesh=begin_mesh,
     start_mesh=start_mesh,
     write_mesh=write_mesh,
@@ -240,4 +298,4 @@ integrate = line_integrator(
     end_mesh=end_mesh,
     keep_mesh=keep_mesh,
 )
-integrates(integrate, ChordLineGroup)
+integrates(integrate, AnyLawPairGroup, ChordGroup, HelicalPairGroup)

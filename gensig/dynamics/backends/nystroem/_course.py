@@ -1,4 +1,4 @@
-"""Nominal motion of a line's reference over time, and the forces that come with it."""
+"""Nominal motion of a machine's reference over time, and the forces that come with it."""
 
 from __future__ import annotations
 
@@ -22,23 +22,26 @@ from gensig.dynamics._vector import (
     width,
 )
 from gensig.dynamics._written import written
+from gensig.dynamics.backends.nystroem import _group as groups
 from gensig.dynamics.backends.nystroem import _layout as rows
-from gensig.dynamics.backends.nystroem import _line_layout as lines
 from gensig.dynamics.backends.nystroem._flat import number_at
-from gensig.dynamics.backends.nystroem._line_layout import of
-from gensig.dynamics.backends.nystroem._line_meshes import touched
+from gensig.dynamics.backends.nystroem._group import meshes_of, of
+from gensig.dynamics.backends.nystroem._meshes import touched
+from gensig.dynamics.equations import A_TURN
 
 
 @inlined
 def profile_rows(group, n):
     """Rows of a cell of the profile of a group of ``n`` lanes."""
-    return lines.N_PROFILE + 2 * (len(group.force) // n + len(group.sources))
+    return groups.N_PROFILE + 2 * (len(group.force) // n + len(group.sources))
 
 
 @inlined
 def _cell(group, time, n):
     """First row of the profile's cell at a time, and the time since its begin."""
     n_rows = profile_rows(group, n)
+    if len(group.profile) == n_rows * n:
+        return 0, time
     n_cells = len(group.profile) // (n_rows * n)
     cell = int(np.floor(time * group.cells_per_second)) - group.profile_first
     cell = min(max(cell, 0), n_cells - 1)
@@ -47,22 +50,24 @@ def _cell(group, time, n):
 
 
 @inlined
-def set_rolls(group, time, machine, wide):
-    """Set the nominal angle and the roll of every mesh at the begin of a step."""
+def set_rolls(group, time, q, machine, wide):
+    """Set the nominal angle and the roll of every mesh at a time; ``q`` is the block of a state."""
     n = width(machine)
-    n_meshes, profile = group.n_meshes, group.profile
+    n_meshes, profile = meshes_of(group), group.profile
     cell, since = _cell(group, time, n)
     for first in range(0, n, EIGHT):
-        speed = load_wide(profile, at(cell + lines.SPEED, first, n))
-        gain = load_wide(profile, at(cell + lines.GAIN, first, n))
+        speed = load_wide(profile, at(cell + groups.SPEED, first, n))
+        gain = load_wide(profile, at(cell + groups.GAIN, first, n))
         turned = since * (speed + (0.5 * since) * gain)
-        turned = load_wide(profile, at(cell + lines.ANGLE, first, n)) + turned
-        turned = turned + load_wide(wide, at(layout.CENTER, first, n))
+        set_angle = load_wide(profile, at(cell + groups.ANGLE, first, n)) + turned
+        turned = set_angle + load_wide(wide, at(layout.CENTER, first, n))
         store(wide, at(layout.NOMINAL, first, n), turned)
         for m in range(n_meshes):
-            own = of(rows.Q, touched(group, m, lines.A_TURN))
-            roll = turned * load_wide(group.turning, at(m, first, n))
-            roll = roll + load_wide(machine, at(own, first, n))
+            own = of(q, touched(group, m, A_TURN))
+            turning = load_wide(group.turning, at(m, first, n))
+            roll = turned * turning + load_wide(machine, at(own, first, n))
+            if group.prescribed:
+                roll = set_angle * turning
             exact = m * layout.N_EXACT
             radius = load_wide(group.exact, at(exact + layout.EXACT_RADIUS, first, n))
             roll = radius * roll
@@ -78,8 +83,8 @@ def set_forces(group, time, machine, wide):
     n_dof = len(group.force) // n
     profile = group.profile
     cell, since = _cell(group, time, n)
-    speed = _in_row(profile, cell + lines.SPEED, machine)
-    gain = _in_row(profile, cell + lines.GAIN, machine)
+    speed = _in_row(profile, cell + groups.SPEED, machine)
+    gain = _in_row(profile, cell + groups.GAIN, machine)
     center = _in_row(wide, layout.CENTER, machine)
     set_row(machine, rows.DRIVE + layout.DRIVE_CENTER, center)
     set_row(machine, rows.DRIVE + layout.DRIVE_SPEED, speed + since * gain)
@@ -87,7 +92,7 @@ def set_forces(group, time, machine, wide):
     for d in range(n_dof):
         given = get_row(group.force, d) - gain * get_row(group.carried, d)
         if len(profile) > profile_rows(group, n) * n:
-            row = cell + lines.N_PROFILE + 2 * d
+            row = cell + groups.N_PROFILE + 2 * d
             given = given + _in_row(profile, row, machine)
             given = given + since * _in_row(profile, row + 1, machine)
         set_row(machine, of(rows.FORCES, d), given)
@@ -118,7 +123,7 @@ def drive(group, begin, since, q, machine, wide):
         if any_above(factor * factor, zero):
             d = number_at(group.sources, s)
             torque = factor * _over_angle(group, s, d, since, q, machine, wide)
-            pushed = of(lines.ON, d)
+            pushed = of(rows.ON, d)
             set_row(machine, pushed, get_row(machine, pushed) + torque)
 
 
@@ -145,10 +150,10 @@ def _place(group, s, d, since, q, first, machine, wide):
     angle = angle * load_wide(group.exact_rotation, at(d, first, n))
     angle = angle + load_wide(machine, at(of(q, d), first, n))
     per_rad, shift, nodes, per_nodes, first_node = (
-        load_wide(group.source_numbers, at(s * lines.N_SOURCE + name, first, n))
-        for name in range(lines.N_SOURCE)
+        load_wide(group.source_numbers, at(s * groups.N_SOURCE + name, first, n))
+        for name in range(groups.N_SOURCE)
     )
     place = angle * per_rad + shift
     place = place - nodes * truncated(place * per_nodes)
     node = truncated(place)
-    return first_node + float(lines.PER_NODE) * node, place - node
+    return first_node + float(groups.PER_NODE) * node, place - node

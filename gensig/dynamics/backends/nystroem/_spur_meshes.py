@@ -1,14 +1,14 @@
-"""Spur meshes of a line, in each of which three pairs of teeth are followed.
-
-Law, tables and kinks are those of the core for one pair.
-"""
+"""Spur meshes of the one-sided law, in each of which three pairs of teeth are followed."""
 
 from __future__ import annotations
 
 from gensig.dynamics import _layout as layout
+from gensig.dynamics._layout import AHEAD
 from gensig.dynamics._record_kernels import integrates
 from gensig.dynamics._vector import (
     any_above,
+    at,
+    compiled,
     get_row,
     inlined,
     set_row,
@@ -17,30 +17,27 @@ from gensig.dynamics._vector import (
     width,
 )
 from gensig.dynamics.backends.nystroem import _layout as rows
-from gensig.dynamics.backends.nystroem import _line_layout as lines
-from gensig.dynamics.backends.nystroem import _spur_pair
-from gensig.dynamics.backends.nystroem._kinks import kinked
-from gensig.dynamics.backends.nystroem._law import mesh_law
-from gensig.dynamics.backends.nystroem._layout import FOLLOWED
-from gensig.dynamics.backends.nystroem._line_kernels import line_integrator
-from gensig.dynamics.backends.nystroem._line_layout import (
-    LineGroup,
+from gensig.dynamics.backends.nystroem._group import (
+    SpurGroup,
+    SpurPairGroup,
     mesh_of,
     mesh_rows,
-    of,
     wide_rows,
 )
-from gensig.dynamics.backends.nystroem._line_meshes import (
-    correct,
-    law_at,
+from gensig.dynamics.backends.nystroem._kernels import integrator
+from gensig.dynamics.backends.nystroem._kinks import kinked, miss, missed_law
+from gensig.dynamics.backends.nystroem._law import mesh_law
+from gensig.dynamics.backends.nystroem._layout import FOLLOWED
+from gensig.dynamics.backends.nystroem._meshes import (
+    choose,
+    correct_by,
+    mean_speed,
     motion,
     push,
-    ratio,
     rolled,
-    touched,
+    set_begun,
     turning_speed,
 )
-from gensig.dynamics.backends.nystroem._pair_kernels import choose
 from gensig.dynamics.backends.nystroem._pairs import (
     first_pairs,
     locate,
@@ -97,10 +94,24 @@ def start_mesh(group, m, slot, fresh, by_tooth, machine, work, wide, near):
 
 @inlined
 def write_mesh(group, m, seen, row, work, wide, near):
-    """Write the state of the pairs of a mesh at the begin of a step."""
-    n = width(work)
-    own, own_wide = mesh_rows(work, m, n), wide_rows(wide, m, n)
-    _spur_pair.write_mesh(mesh_of(group, m, n), seen, row, own, own_wide, near)
+    """Write the state of the pairs of a mesh at the begin of a step, the newest pair first."""
+    n, first = width(work), row * layout.N_SEEN
+    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
+    own_wide = wide_rows(wide, m, n)
+    for lane in range(n):
+        pitch = mesh.exact[at(layout.PITCH, lane, n)]
+        newest = int((own_wide[at(layout.BASE, lane, n)] / pitch) // 1.0)
+        newest = newest - mesh.indices[at(layout.FIRST_PITCH, lane, n)]
+        seen[at(first + layout.SEEN_NEWEST, lane, n)] = newest
+        normal = own[at(rows.NORMAL, lane, n)]
+        seen[at(first + layout.SEEN_FORCE, lane, n)] = normal
+        for k in range(layout.MOST_PAIRS):
+            seen[at(first + layout.SEEN_PAIRS + k, lane, n)] = 0.0
+        for j in range(FOLLOWED):
+            k = newest - int(own_wide[at(rows.NUMBER + j, lane, n)])
+            if 0 <= k < layout.MOST_PAIRS:
+                force = own[at(rows.PAIR_FORCE + j, lane, n)]
+                seen[at(first + layout.SEEN_PAIRS + k, lane, n)] = force
 
 
 @inlined
@@ -109,23 +120,39 @@ def read_mesh(group, m, slot, next_slot, step, by_tooth, machine, work, wide, ne
     n = width(work)
     mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
     own_wide = wide_rows(wide, m, n)
-    zero = spread(work, 0.0)
     if locate(mesh, own, own_wide):
         take_pairs(mesh, by_tooth, own, own_wide)
     # the roll at the end of the step, with every force in it
-    now, v = rows.NOW, rows.V
-    d = touched(group, m, lines.A_TURN)
-    gain = ratio(group, m, machine) * get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
-    gain = gain + get_row(machine, of(now, d))
-    speed = turning_speed(group, m, v, zero, machine) + (0.5 * step) * gain
-    radius = get_row(mesh.numbers, layout.PINION_RADIUS)
-    ahead, behind = step * radius * speed, get_row(own, rows.BEHIND)
-    span = ahead - behind
+    ahead = step * get_row(mesh.numbers, layout.PINION_RADIUS)
+    ahead = ahead * mean_speed(group, m, step, machine)
+    span = ahead - get_row(own, rows.BEHIND)
     per_span = 1.0 / span
     for j in range(FOLLOWED):
         read_step(mesh, by_tooth, j, ahead, span, per_span, own, own_wide)
-    set_row(own, lines.AHEAD, ahead)
-    set_row(own, lines.BEGUN, get_row(machine, of(rows.Q, d)))
+    set_row(own, AHEAD, ahead)
+    set_begun(group, m, machine, own)
+
+
+@inlined
+def _law_at(group, m, nodes, instant, off, turned, since, q, v, machine, work, wide):
+    """Law of a mesh at a state, ``off`` m after its nodes and ``turned`` m after the begin."""
+    n = width(work)
+    mesh = mesh_of(group, m, n)
+    approach, rate = motion(group, m, q, v, machine)
+    speed = turning_speed(group, m, v, since, machine)
+    roll_rate = get_row(mesh.numbers, layout.PINION_RADIUS) * speed
+    return mesh_law(
+        mesh,
+        nodes,
+        instant,
+        off,
+        turned,
+        approach,
+        rate,
+        roll_rate,
+        mesh_rows(work, m, n),
+        wide_rows(wide, m, n),
+    )
 
 
 @inlined
@@ -135,10 +162,10 @@ def push_middle(group, m, step, machine, work, wide, near):
     q, v = rows.MIDDLE_Q, rows.MIDDLE_V
     own = mesh_rows(work, m, n)
     turned = rolled(group, m, 0.5 * step, q, machine, own)
-    ahead = get_row(own, lines.AHEAD)
+    ahead = get_row(own, AHEAD)
     off = turned - 0.5 * (ahead + get_row(own, rows.BEHIND))
     since = spread(work, 0.5 * step)
-    law = law_at(
+    law = _law_at(
         group,
         m,
         rows.MIDDLE,
@@ -162,25 +189,37 @@ def push_end(group, m, slot, step, machine, work, wide, near):
     q, v = rows.END_Q, rows.END_V
     own = mesh_rows(work, m, n)
     turned = rolled(group, m, step, q, machine, own)
-    off = turned - get_row(own, lines.AHEAD)
+    off = turned - get_row(own, AHEAD)
     since = spread(work, step)
-    law = law_at(
+    law = _law_at(
         group, m, rows.NODES, rows.END_AT, off, turned, since, q, v, machine, work, wide
     )
     push(group, m, law, machine)
     set_row(own, rows.NORMAL, law.normal)
 
 
+@compiled
+def _correct(group, m, step, changed, machine, work):
+    """Add to the end of the step what the kinks of a mesh change, in the lanes with any.
+
+    ``changed`` holds for every pair 1 where it has a kink.
+    """
+    mesh, own = mesh_of(group, m, width(work)), mesh_rows(work, m, width(work))
+    miss(mesh.numbers, changed, own)
+    any_changed = changed[0] + changed[1] + changed[2]
+    short, early = missed_law(mesh, rows.SHORT, own), missed_law(mesh, rows.EARLY, own)
+    correct_by(group, m, short, early, step, any_changed, machine)
+
+
 @inlined
 def end_mesh(group, m, slot, step, machine, work, near):
     """Correct the end of the step for the kinks of a mesh, and shift what it remembers."""
-    n = width(work)
-    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
+    own = mesh_rows(work, m, width(work))
     changed = kinked(0, own), kinked(1, own), kinked(2, own)
     if any_above(changed[0] + changed[1] + changed[2], spread(work, 0.0)):
-        correct(group, mesh, m, step, changed, machine, own)
+        _correct(group, m, step, changed, machine, work)
     turned = rolled(group, m, step, rows.Q, machine, own)
-    set_row(own, rows.BEHIND, get_row(own, lines.AHEAD) - turned)
+    set_row(own, rows.BEHIND, get_row(own, AHEAD) - turned)
     for j in range(FOLLOWED):
         margin = get_row(own, rows.MARGIN + rows.END_AT * FOLLOWED + j)
         set_row(own, rows.MARGIN + j, margin)
@@ -191,7 +230,7 @@ def keep_mesh(m, work, wide, near):
     """Do nothing: a mesh has no slots."""
 
 
-integrate = line_integrator(
+integrate = integrator(
     begin_mesh=begin_mesh,
     start_mesh=start_mesh,
     write_mesh=write_mesh,
@@ -201,4 +240,4 @@ integrate = line_integrator(
     end_mesh=end_mesh,
     keep_mesh=keep_mesh,
 )
-integrates(integrate, LineGroup)
+integrates(integrate, SpurGroup, SpurPairGroup)

@@ -1,0 +1,166 @@
+"""A machine as numbers: bodies, springs, meshes, governor and torques, in SI units.
+
+Gear pairs and drive lines are integrated by these alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dynamics.mesh_teeth import MeshTeeth
+
+Array = NDArray[np.float64]
+
+# motions that a mesh acts on: x, y and rotation of its driving gear a and its driven gear b;
+# helical gears that move along their axes have more after them
+A_X, A_Y, A_TURN, B_X, B_Y, B_TURN, N_IN_PLANE = range(7)
+NONE = -1  # for a gear that does not move so
+# of the first six in a gear pair, whose y is the line of action
+PAIR_SLIDE = (1.0, 0.0, 0.0, -1.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Mesh:
+    """A gear mesh between the bodies of a machine.
+
+    Parameters
+    ----------
+    touched : (motion,)    degrees of freedom that it acts on, ``NONE`` where there is none
+    reach : (motion,)      gradient of the approach along them
+    slide : (motion,)      direction of its friction
+    damping : N s/m, of the one-sided law per N of the force of a pair of teeth
+    mean_force : N
+    speed : rad/s          of gear a at the set-point
+    """
+
+    teeth: MeshTeeth
+    touched: NDArray[np.int64]
+    reach: Array
+    slide: Array
+    damping: float
+    mean_force: float
+    speed: float
+
+    def approach(self, deflection: Array) -> float:
+        """Approach of the flanks at a deflection (dof,), m."""
+        moved = np.where(self.touched == NONE, 0.0, deflection[self.touched])
+        return float(self.reach @ moved)
+
+    def push(self, n_dof: int) -> Array:
+        """Gradient of the approach along all degrees of freedom, (dof,)."""
+        direction = np.zeros(n_dof)
+        is_there = self.touched != NONE
+        direction[self.touched[is_there]] = self.reach[is_there]
+        return direction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OverAngle:
+    """A torque that follows the angle of its own degree of freedom.
+
+    ``nodes`` (node,) N m stand at equal distances over a period, straight between them;
+    ``per_rad`` is the number of nodes per rad, and ``shift`` the place in nodes at angle 0.
+    """
+
+    dof: int
+    nodes: Array
+    per_rad: float
+    shift: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Equations:
+    """M q'' + C q' + K q = f + mesh forces; q is the deviation from nominal rotation.
+
+    Parameters
+    ----------
+    mass : (dof,) kg or kg m2
+    stiffness, damping : (dof, dof)    without the governor
+    rotation : (dof,)    of each with that of the reference, 0 for a translation
+    held : (dof,)        the governor's stiffness is ``held`` times ``held``
+    held_damping : s     its damping is so many times its stiffness
+    sources : torques over an angle
+    reference : degree of freedom whose rotation is 1
+    angles : degrees of freedom whose angles are given out
+    """
+
+    mass: Array
+    stiffness: Array
+    damping: Array
+    rotation: Array
+    held: Array
+    held_damping: float
+    meshes: tuple[Mesh, ...]
+    sources: tuple[OverAngle, ...]
+    reference: int
+    angles: tuple[int, ...]
+
+    def holding(self, deflection: Array) -> Array:
+        """Forces that hold a deflection against springs and mean mesh forces, (dof,)."""
+        force = self.stiffness @ deflection + self.held * (self.held @ deflection)
+        for mesh in self.meshes:
+            force = force + mesh.mean_force * mesh.push(len(deflection))
+        return np.asarray(force)
+
+    @property
+    def is_gear_pair(self) -> bool:
+        """True for one mesh of two gears that are the first bodies, with y along its line."""
+        mesh = self.meshes[0]
+        plane = mesh.reach[:N_IN_PLANE]
+        return (
+            len(self.meshes) == 1
+            and np.array_equal(mesh.touched, np.arange(len(mesh.touched)))
+            and np.array_equal(mesh.slide[:N_IN_PLANE], PAIR_SLIDE)
+            and np.array_equal(plane[[A_X, A_Y, B_X, B_Y]], [0.0, -1.0, 0.0, 1.0])
+            and self.rotation[A_TURN] == 1.0
+        )
+
+
+class Dynamics(Protocol):
+    """A machine in motion, which can be integrated: a gear pair, or a line of several meshes."""
+
+    @property
+    def dofs(self) -> tuple[str, ...]:
+        """Names of the degrees of freedom."""
+
+    @property
+    def equations(self) -> Equations:
+        """The machine as numbers."""
+
+    @property
+    def is_steady(self) -> bool:
+        """True where neither speed nor torques change over time."""
+
+    @property
+    def rest(self) -> Array:
+        """Deflection about which the machine moves, its reference not turned, (dof,)."""
+
+    @property
+    def stiff_rates(self) -> NDArray[np.complex128]:
+        """Eigenvalues with the meshes held stiffer than their mean, 1/s."""
+
+    @property
+    def settling_time(self) -> float:
+        """Time after which the start's transient has fallen to 1e-4, s."""
+
+    def start(self, time: float) -> tuple[Array, Array]:
+        """Deflections and their rates from which a motion settles at a nominal time, (dof,) each.
+
+        Rates are 0 where the machine starts at rest.
+        """
+
+    def course(self, times: Array) -> tuple[Array, Array]:
+        """Angle in rad since time 0 and speed in rad/s of the reference at times in s, (time,).
+
+        ``times`` increase and hold 0.
+        """
+
+    def forces(self, times: Array) -> Array:
+        """Torques and forces that follow no angle, on the degrees of freedom, (time, dof)."""
+
+    def factors(self, times: Array) -> Array:
+        """Factors of the torques over an angle at times in s, (time, source)."""
