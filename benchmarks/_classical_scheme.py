@@ -12,8 +12,7 @@ from typing import final
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._layout import AHEAD, BASE, EVEN, ROLL, is_helical
 from gensig.dynamics._mesh_kernels import mesh_law
-from gensig.dynamics._record_kernels import integrates
-from gensig.dynamics._slots import near_pairs, write_mesh
+from gensig.dynamics._record_kernels import recorder
 from gensig.dynamics._tables import gather
 from gensig.dynamics._vector import (
     at,
@@ -30,15 +29,9 @@ from gensig.dynamics.backends.base import Backend, Integration, Motions
 from gensig.dynamics.backends.group_motions import integrate_machines
 from gensig.dynamics.backends.group_run import Core
 from gensig.dynamics.backends.nystroem import _layout as rows
-from gensig.dynamics.backends.nystroem import machine_lanes
-from gensig.dynamics.backends.nystroem._course import set_forces, set_rolls
+from gensig.dynamics.backends.nystroem._course import cell_at, set_forces, set_rolls
 from gensig.dynamics.backends.nystroem._flat import number_at
 from gensig.dynamics.backends.nystroem._group import (
-    AnyLawPairGroup,
-    ChordGroup,
-    HelicalPairGroup,
-    SpurGroup,
-    SpurPairGroup,
     integer_rows,
     machine_rows,
     mesh_of,
@@ -58,6 +51,8 @@ from gensig.dynamics.backends.nystroem._meshes import (
     push,
     turning_speed,
 )
+from gensig.dynamics.backends.nystroem._slots import near_pairs, write_mesh
+from gensig.dynamics.backends.nystroem.machine_lanes import pack
 from gensig.dynamics.equations import Dynamics
 from gensig.dynamics.pair import PairDynamics
 
@@ -148,8 +143,9 @@ def law_at(group, motion, work, wide, near, law_rows):
 def pull(group, time, machine, work, wide, near):
     """Set the forces on the state of a stage at a time."""
     n, (q, v) = width(work), STAGE
-    set_rolls(group, time, q, machine, wide)
-    set_forces(group, time, machine, wide)
+    cell, since = cell_at(group, time, n)
+    set_rolls(group, cell, since, q, machine, wide)
+    set_forces(group, cell, since, machine, wide)
     for d in range(len(group.force) // n):
         own_pull(
             group,
@@ -264,49 +260,11 @@ def integrate(
     return angle_row
 
 
-class ClassicalSpurGroup(SpurGroup):
-    """Spur machines, for this scheme."""
-
-
-class ClassicalChordGroup(ChordGroup):
-    """Machines with chords, for this scheme."""
-
-
-class ClassicalSpurPairGroup(SpurPairGroup):
-    """Spur pairs, for this scheme."""
-
-
-class ClassicalAnyLawPairGroup(AnyLawPairGroup):
-    """Spur pairs of any law, for this scheme."""
-
-
-class ClassicalHelicalPairGroup(HelicalPairGroup):
-    """Helical pairs, for this scheme."""
-
-
-KINDS = {
-    kind.__base__: kind
-    for kind in (
-        ClassicalSpurGroup,
-        ClassicalChordGroup,
-        ClassicalSpurPairGroup,
-        ClassicalAnyLawPairGroup,
-        ClassicalHelicalPairGroup,
-    )
-}
-integrates(integrate, *KINDS.values())
-
-
-def pack(dynamics, step, precision="float64", span=(0.0, 0.0)):
-    """Machines as one group of this scheme."""
-    group = machine_lanes.pack(dynamics, step, precision, span)
-    return KINDS[type(group)](*group)
-
-
 CORE = Core(
     pack=pack,
     scratch=scratch,
     integrate=integrate,
+    record=recorder(integrate),
     coarsest_oversampling=lambda machine, oversampling, rate: min(
         oversampling, SETTLING
     ),

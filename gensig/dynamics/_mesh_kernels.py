@@ -41,7 +41,7 @@ from gensig.dynamics._vector import (
     where_above,
     width,
 )
-from gensig.dynamics._written import written
+from gensig.dynamics._written import call, either, written
 from gensig.mesh.pair_table import N_PAIRS
 
 
@@ -440,18 +440,27 @@ def mesh_law(
     return law
 
 
-@inlined
+@written
 def with_coast(group, law, turned, approach, rate, roll_rate, work, wide):
     """The law of the drive flanks with that of the back flanks, in the lanes that touch there."""
-    n, numbers = width(work), group.numbers
-    if any_above(0.0 - get_row(numbers, BACKLASH), approach):
+
+    def touch():
         _set_contact(law, turned, approach, rate, roll_rate, work)
-        for lane in range(n):
-            coast = work[at(layout.MOTION_APPROACH, lane, n)]
-            if coast < -numbers[at(BACKLASH, lane, n)]:
-                coast_law(group, lane, work, wide)
-        law = _set_law(work)
-    return law
+        call(_coast, group, work, wide)
+        return _set_law(work)
+
+    beyond = any_above(0.0 - get_row(group.numbers, BACKLASH), approach)
+    return Law(*either(beyond, touch, law))
+
+
+@compiled
+def _coast(group, work, wide):
+    """Add the law of the back flanks in the lanes that touch there."""
+    n = width(work)
+    for lane in range(n):
+        coast = work[at(layout.MOTION_APPROACH, lane, n)]
+        if coast < -group.numbers[at(BACKLASH, lane, n)]:
+            coast_law(group, lane, work, wide)
 
 
 @written

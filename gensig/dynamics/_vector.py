@@ -11,77 +11,24 @@ signature and a function that builds the code.
 
 from __future__ import annotations
 
-import functools
-import hashlib
 import operator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit
 from numba.core import types
 from numba.core.cgutils import get_or_insert_function
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import lower_builtin, models, register_model
 from numpy.typing import NDArray
 
-from gensig.compilation import readable, watch
+from gensig.dynamics._caching import compiled as compiled
+from gensig.dynamics._caching import inlined as inlined
 from gensig.dynamics._written import OPERATIONS, intrinsic, written
 
-watch()
 PRECISIONS = ("float64", "float32")
 GROUP_BYTES = 64
 FOUR = 4
-
-# A step costs a third less without Numba's reference counting, which these kernels do not need:
-# arrays are borrowed, none is made.
-OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
-
-
-def source_stamp(folder: Path) -> str:
-    """Hash of all private modules below a folder, whose compiled functions call each other."""
-    digest = hashlib.sha256()
-    for path in sorted(folder.rglob("_[!_]*.py")):
-        name = str(path.relative_to(folder))
-        digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()
-
-
-_STAMP = source_stamp(Path(__file__).parents[1])  # of the whole package
-
-
-def _stamped(decorator):
-    """The decorator, with a cache that is stale after a change of any of the files.
-
-    Numba checks only the file of the function itself, and would use code that was compiled of the
-    former content of another file.
-    """
-
-    def decorate(function):
-        dispatcher = decorator(function)
-        if hasattr(dispatcher, "_cache"):  # not where NUMBA_DISABLE_JIT is set
-            files = dispatcher._cache._cache_file
-            files._source_stamp = _STAMP
-            files._load_index = functools.partial(readable, files._load_index)
-            _compile_once(dispatcher)
-        return dispatcher
-
-    return decorate
-
-
-def _compile_once(dispatcher) -> None:
-    """Let callers whose numbers are known share the code of those whose numbers are not."""
-    template = dispatcher.get_call_template
-
-    def of_unknown(kinds, named):
-        return template(tuple(map(types.unliteral, kinds)), named)
-
-    dispatcher.get_call_template = of_unknown
-
-
-compiled: Any = _stamped(functools.partial(njit, nogil=True, **OPTIONS)())
-inlined: Any = _stamped(functools.partial(njit, inline="always", **OPTIONS)())
 
 _INDEX = ir.IntType(32)
 

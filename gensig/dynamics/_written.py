@@ -2,19 +2,21 @@
 
 Numba's compiler takes milliseconds for every line, in every place that a function is inlined. A
 written function is run as Python instead, with a ``Value`` for what is not known yet, and each
-operation writes its instruction. Its loops and branches are those of Python, over what is known.
-It can call other written functions and intrinsics.
+operation writes its instruction. Its loops and branches are those of Python, over what is known;
+``loop``, ``when`` and ``either`` write those of the compiled code, whose bodies are run once. It
+can call other written functions and intrinsics, and ``call`` those that Numba compiles.
 """
 
 from __future__ import annotations
 
 import inspect
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from llvmlite import ir
-from numba.core import types
+from numba.core import cgutils, types
 from numba.core.extending import _Intrinsic
 from numba.core.registry import cpu_target
 
@@ -36,11 +38,11 @@ for _operation in (operator.add, operator.sub, operator.mul):
 
 
 class Code:
-    """Place in a function at which instructions are written."""
+    """Place in a function at which instructions are written, ``is_kept`` unless for their types."""
 
-    def __init__(self, context, typing_context, builder) -> None:
+    def __init__(self, context, typing_context, builder, *, is_kept=True) -> None:
         self.context, self.typing_context = context, typing_context
-        self.builder = builder
+        self.builder, self.is_kept = builder, is_kept
 
     def value(self, kind, llvm):
         """A number that is known, a tuple of values, or a ``Value``: Python calculates with it."""
@@ -143,13 +145,7 @@ class Written(Intrinsic):
         def definition(typing_context, *kinds):
             return _defined(function, typing_context, kinds)
 
-        # Numba reads the names of the arguments
-        own = inspect.signature(function)
-        first = inspect.signature(definition).parameters["typing_context"]
-        parameters = [first, *own.parameters.values()]
-        named: Any = definition
-        named.__signature__ = own.replace(parameters=parameters)
-        named.__name__ = function.__name__
+        _name(definition, function)
         super().__init__(definition, prefer_literal=True)
         self._function = function
 
@@ -157,22 +153,53 @@ class Written(Intrinsic):
         return self._function(*arguments)
 
 
+def _name(definition: Any, function: Callable[..., Any]) -> None:
+    """Give a definition the arguments of a function, whose names Numba reads, and its name."""
+    own = inspect.signature(function)
+    first = inspect.signature(definition).parameters["typing_context"]
+    parameters = [first, *own.parameters.values()]
+    definition.__signature__ = own.replace(parameters=parameters)
+    definition.__name__ = function.__name__
+
+
 def _defined(function, typing_context, kinds):
     """Signature of a written function, from code that is thrown away, and what builds its code."""
 
-    def run(context, builder, llvms):
-        code = Code(context, typing_context, builder)
-        return code.typed(function(*map(code.value, kinds, llvms)))
+    def run(context, builder, llvms, *, is_kept):
+        here = Code(context, typing_context, builder, is_kept=is_kept)
+        with _writing_to(here) as code:
+            return code.typed(function(*map(code.value, kinds, llvms)))
 
     def build(context, builder, sig, args):
-        return run(context, builder, args)[1]
+        return run(context, builder, args, is_kept=True)[1]
 
     context = cpu_target.target_context
     arguments = [context.get_value_type(kind) for kind in kinds]
     signature = ir.FunctionType(ir.VoidType(), arguments)
     nowhere = ir.Function(ir.Module(), signature, function.__name__)
     builder = ir.IRBuilder(nowhere.append_basic_block())
-    return run(context, builder, nowhere.args)[0](*kinds), build
+    kind, _ = run(context, builder, nowhere.args, is_kept=False)
+    return kind(*kinds), build
+
+
+class Traced(Intrinsic):
+    """A written function without a result, which is run once, where a compiled one calls it."""
+
+    def __init__(self, function) -> None:
+        def definition(typing_context, *kinds):
+            def build(context, builder, sig, args):
+                with _writing_to(Code(context, typing_context, builder)) as code:
+                    function(*map(code.value, sig.args, args))
+                return context.get_dummy_value()
+
+            return types.void(*kinds), build
+
+        _name(definition, function)
+        super().__init__(definition, prefer_literal=True)
+        self._function = function
+
+    def __call__(self, *arguments):
+        return self._function(*arguments)
 
 
 intrinsic: Any = Intrinsic
@@ -193,3 +220,74 @@ def type_test(kind: type) -> Any:
 
 
 written: Any = Written
+traced: Any = Traced
+
+
+_open: list[Code] = []  # to which functions that are run write, the innermost last
+
+
+@contextmanager
+def _writing_to(code: Code) -> Iterator[Code]:
+    _open.append(code)
+    try:
+        yield code
+    finally:
+        _open.pop()
+
+
+def loop(count: Any, body: Callable[[Any], None]) -> None:
+    """Write a loop whose body is run once, for an index that is not known.
+
+    ``count`` is an integer. Values that the body makes must not be used after it, nor can it change
+    any: sums live in rows. A count of 1 that is known needs no loop.
+    """
+    if isinstance(count, int) and count == 1:
+        body(0)
+        return
+    code = _open[-1]
+    _, llvm = code.typed(count)
+    with cgutils.for_range(code.builder, llvm) as place:
+        body(Value(code, types.intp, place.index))
+
+
+def any_of(*conditions: Value) -> Value:
+    """True where any of some conditions holds."""
+    code, total = _open[-1], conditions[0].llvm
+    for condition in conditions[1:]:
+        total = code.builder.or_(total, condition.llvm)
+    return Value(code, types.boolean, total)
+
+
+def when(condition: Value, body: Callable[[], None]) -> None:
+    """Write a branch that is seldom taken; values that it makes must not be used after it."""
+    with _open[-1].builder.if_then(condition.llvm, likely=False):
+        body()
+
+
+def either(
+    condition: Value, body: Callable[[], Sequence[Any]], values: Sequence[Any]
+) -> list[Any]:
+    """Values that a branch gives where it is taken, which is seldom, else those that are given."""
+    code = _open[-1]
+    before, given = code.builder.block, [code.typed(value) for value in values]
+    with code.builder.if_then(condition.llvm, likely=False):
+        changed = [code.typed(value) for value in body()]
+        inside = code.builder.block
+    result = []
+    for (kind, old), (_, new) in zip(given, changed, strict=True):
+        either_way = code.builder.phi(old.type)
+        either_way.add_incoming(old, before)
+        either_way.add_incoming(new, inside)
+        result.append(Value(code, kind, either_way))
+    return result
+
+
+def call(function: Any, *values: Any) -> None:
+    """Write a call of a function that Numba compiles; its result is dropped."""
+    code = _open[-1]
+    if not code.is_kept:
+        return
+    kinds, llvms = zip(*map(code.typed, values), strict=True)
+    kind = types.Dispatcher(function)
+    sig = kind.get_call_type(code.typing_context, kinds, {})
+    code.context.get_function(kind, sig)(code.builder, llvms)

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 # motions that a mesh acts on: x, y and rotation of its driving gear a and its driven gear b;
 # helical gears that move along their axes have more after them
 A_X, A_Y, A_TURN, B_X, B_Y, B_TURN, N_IN_PLANE = range(7)
+N_MOTIONS = 12  # of helical gears
 NONE = -1  # for a gear that does not move so
 # of the first six in a gear pair, whose y is the line of action
 PAIR_SLIDE = (1.0, 0.0, 0.0, -1.0, 0.0, 0.0)
@@ -108,11 +109,17 @@ class Equations:
 
     @property
     def is_gear_pair(self) -> bool:
-        """True for one mesh of two gears that are the first bodies, with y along its line."""
+        """True for one mesh of two gears that are the first bodies, with y along its line.
+
+        Dampers are beside springs, and no torque follows an angle.
+        """
         mesh = self.meshes[0]
         plane = mesh.reach[:N_IN_PLANE]
+        joined = self.stiffness != 0.0
         return (
             len(self.meshes) == 1
+            and not self.sources
+            and not np.any(self.damping[~joined])
             and np.array_equal(mesh.touched, np.arange(len(mesh.touched)))
             and np.array_equal(mesh.slide[:N_IN_PLANE], PAIR_SLIDE)
             and np.array_equal(plane[[A_X, A_Y, B_X, B_Y]], [0.0, -1.0, 0.0, 1.0])

@@ -26,13 +26,14 @@ NO_TAPS = np.empty(0, dtype=LOW_PASS_PRECISION)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Core:
-    """A method in compiled functions, as ``_record_kernels.integrate`` describes them.
+    """A method in compiled functions.
 
     Parameters
     ----------
     pack : machines of one kind as one group, for a step in s, a precision, and a span in s
     scratch : work rows, float64 rows and integers for meshes, degrees of freedom and precision
     integrate : advances a group in the precision of its scratch
+    record : integrates and decimates by it, see ``_record_kernels.recorder``
     coarsest_oversampling : the least stable number of steps per sample of a machine, at most a
         given one, at a sampling rate
     """
@@ -40,6 +41,7 @@ class Core:
     pack: Callable[[Sequence[Dynamics], float, str, tuple[float, float]], Any]
     scratch: Callable[[int, int, str], tuple[NDArray[Any], Array, NDArray[np.int64]]]
     integrate: Any
+    record: Any
     coarsest_oversampling: Callable[[Dynamics, int, float], int]
 
 
@@ -94,7 +96,7 @@ class GroupRun:
 
     def advance(self, group: Any, step: float, first_step: int, n_steps: int) -> None:
         """Integrate; the next call continues from there unless lanes are marked as fresh."""
-        _record_kernels.record(
+        self.core.record(
             group,
             self.state.ravel(),
             self.lost.ravel(),
@@ -146,7 +148,7 @@ class GroupRun:
         width = n_lanes(LOW_PASS_PRECISION)
         n_rows = _record_kernels.step_rows(per_step, width)
         n_narrow = _record_kernels.narrow_steps(len(taps), factor) * n_rows * width
-        _record_kernels.record(
+        self.core.record(
             group,
             self.state.ravel(),
             self.lost.ravel(),

@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
-from gensig.dynamics._vector import LANES, compiled, get_row, set_row
-from gensig.dynamics._written import written
+from gensig.dynamics._vector import (
+    LANES,
+    any_above,
+    compiled,
+    get_row,
+    set_row,
+    spread,
+)
+from gensig.dynamics._written import any_of, call, either, loop, traced, when, written
 
 
 class Parts(NamedTuple):
@@ -78,3 +85,61 @@ def test_nothing_depends_on_what_is_not_known(function) -> None:
 
     with pytest.raises((TypeError, NumbaError)):
         calling(3.0)
+
+
+@compiled
+def mark(rows, at):
+    """Set a row to 7 in its first lane."""
+    rows[at * LANES] = 7.0
+
+
+@traced
+def branches(rows, n, flags):
+    """Sum n rows behind row 1 into row 0, and let branches change others."""
+    zero, one = spread(rows, 0.0), spread(rows, 1.0)
+    bodies.append("run")
+
+    def add(k):
+        set_row(rows, 0, get_row(rows, 0) + get_row(rows, 2 + k))
+
+    loop(n, add)
+    loop(1, lambda k: set_row(rows, 1, one))
+    is_set = any_above(flags, zero)
+    when(is_set, lambda: call(mark, rows, n))
+    is_low = any_above(zero, flags)
+    first, second = either(any_of(is_set, is_low), lambda: (one, zero), (zero, one))
+    set_row(rows, 8, first)
+    set_row(rows, 9, second)
+
+
+bodies: list[str] = []
+
+
+@compiled
+def run_branches(rows, n, flag):
+    branches(rows, n, spread(rows, flag))
+
+
+@pytest.mark.parametrize("flag", [-1.0, 0.0, 1.0])
+def test_loops_and_branches_of_the_compiled_code(flag) -> None:
+    """The body of a loop is written once, whatever its count; a branch is taken where it holds."""
+    rows = np.zeros((10, LANES))
+    rows[2:6] = np.arange(4 * LANES).reshape(4, LANES)
+    expected = rows[2:6].sum(axis=0)
+    run_branches(rows.ravel(), 4, flag)
+    np.testing.assert_array_equal(rows[0], expected)
+    assert (rows[1] == 1.0).all()
+    assert rows[4, 0] == (7.0 if flag > 0.0 else 2 * LANES)
+    assert (rows[8] == (flag != 0.0)).all()
+    assert (rows[9] == (flag == 0.0)).all()
+
+
+def test_traced_functions_are_run_once() -> None:
+    bodies.clear()
+
+    @compiled
+    def calling(rows, n, flag):
+        branches(rows, n, spread(rows, flag))
+
+    calling(np.zeros(10 * LANES), 2, 0.0)
+    assert bodies == ["run"]

@@ -7,8 +7,9 @@ slopes. Spur teeth among helical ones have one chord.
 
 from __future__ import annotations
 
+from typing import final
+
 from gensig.dynamics import _layout as layout
-from gensig.dynamics import _slots
 from gensig.dynamics._layout import (
     AHEAD,
     BASE,
@@ -19,8 +20,6 @@ from gensig.dynamics._layout import (
     span_index,
 )
 from gensig.dynamics._mesh_kernels import mesh_law
-from gensig.dynamics._record_kernels import integrates
-from gensig.dynamics._slots import keep_begin, near_pairs, roll_ahead
 from gensig.dynamics._tables import between, chords_between, cover, gather
 from gensig.dynamics._vector import (
     any_above,
@@ -33,8 +32,9 @@ from gensig.dynamics._vector import (
     where_above,
     width,
 )
-from gensig.dynamics._written import written
+from gensig.dynamics._written import call, written
 from gensig.dynamics.backends.nystroem import _layout as rows
+from gensig.dynamics.backends.nystroem import _slots
 from gensig.dynamics.backends.nystroem._any_law_kinks import (
     begin_again,
     count_anew,
@@ -46,15 +46,12 @@ from gensig.dynamics.backends.nystroem._any_law_kinks import (
 )
 from gensig.dynamics.backends.nystroem._chord_kinks import miss_chords, read_again
 from gensig.dynamics.backends.nystroem._group import (
-    AnyLawPairGroup,
-    ChordGroup,
-    HelicalPairGroup,
     integer_rows,
     mesh_of,
     mesh_rows,
     wide_rows,
 )
-from gensig.dynamics.backends.nystroem._kernels import integrator
+from gensig.dynamics.backends.nystroem._kernels import Law
 from gensig.dynamics.backends.nystroem._layout import END_AT, MIDDLE_AT
 from gensig.dynamics.backends.nystroem._meshes import (
     choose,
@@ -66,6 +63,7 @@ from gensig.dynamics.backends.nystroem._meshes import (
     set_begun,
     turning_speed,
 )
+from gensig.dynamics.backends.nystroem._slots import keep_begin, near_pairs, roll_ahead
 
 
 @inlined
@@ -111,9 +109,10 @@ def _keep_near(first, last, n, near):
 
 
 @compiled
-def _read_slots(mesh, slot, next_slot, approach, work, wide, near):
+def _read_slots(mesh, slot, next_slot, step, approach, rate, work, wide, near):
     """Read the tables where ``AHEAD`` of the next slot says, and keep which pairs come near."""
     n = width(work)
+    _look_ahead(mesh, step, approach, rate, work)
     roll_ahead(next_slot, work, wide)
     set_row(work, layout.FLAGS, spread(work, 1.0))
     rechosen = gather(mesh, next_slot, True, work, wide, near)
@@ -133,7 +132,7 @@ def _read_slots(mesh, slot, next_slot, approach, work, wide, near):
 
 
 @compiled
-def begin_mesh(group, m, slot, fresh, step, machine, work, wide, near):
+def _begin_mesh(group, m, slot, fresh, step, machine, work, wide, near):
     """Read the tables of a mesh at the begin of the first step of a call."""
     n = width(work)
     mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
@@ -145,8 +144,8 @@ def begin_mesh(group, m, slot, fresh, step, machine, work, wide, near):
     _read_begin(mesh, slot, fresh, step, approach, rate, own, own_wide, counts)
 
 
-@inlined
-def start_mesh(group, m, slot, fresh, by_tooth, machine, work, wide, near):
+@compiled
+def _start_mesh(group, m, slot, fresh, machine, work, wide, near):
     """Push by a mesh at the begin of a step, and set what it remembers where it is fresh."""
     n = width(work)
     mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
@@ -161,7 +160,7 @@ def start_mesh(group, m, slot, fresh, by_tooth, machine, work, wide, near):
         set_row(own, rows.ANY_SHORT + k, get_row(own, layout.PAIR_FORCE + k))
     first, last = near_pairs(slot, n, counts)
     _keep_near(first, last, n, counts)
-    push_mesh(group, m, slot, END_AT, 0.0, rows.Q, rows.V, machine, work, wide, near)
+    _push_mesh(group, m, slot, END_AT, 0.0, rows.Q, rows.V, machine, work, wide, near)
     count_anew(mesh, own, counts)
     _keep_others(rows.NORMAL, rows.ANY_EARLY, own)
     for k in range(layout.MOST_PAIRS):
@@ -171,8 +170,8 @@ def start_mesh(group, m, slot, fresh, by_tooth, machine, work, wide, near):
             choose(get_row(own, rows.FRESH), margin_row(rows.BEGIN_AT, k), margin, own)
 
 
-@inlined
-def write_mesh(group, m, seen, row, work, wide, near):
+@compiled
+def _write_mesh(group, m, seen, row, work, wide, near):
     """Write the state of the pairs of a mesh at the begin of a step."""
     own, counts = mesh_rows(work, m, width(work)), integer_rows(near, m, width(work))
     _slots.write_mesh(seen, row, get_row(own, rows.NORMAL), own, counts)
@@ -185,23 +184,8 @@ def _keep_others(row, kept, own):
     set_row(own, row, where_above(flags, zero, get_row(own, row), get_row(own, kept)))
 
 
-@inlined
-def read_mesh(group, m, slot, next_slot, step, by_tooth, machine, work, wide, near):
-    """Read the tables of a mesh at the end of the step, and set those in its middle."""
-    n = width(work)
-    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
-    own_wide, counts = wide_rows(wide, m, n), integer_rows(near, m, n)
-    approach, rate = motion(group, m, rows.Q, rows.V, machine)
-    _look_ahead(mesh, step, approach, rate, own)
-    ahead = step * get_row(mesh.numbers, layout.PINION_RADIUS)
-    ahead = ahead * mean_speed(group, m, step, machine)
-    set_row(own, AHEAD + next_slot, ahead)
-    _read_slots(mesh, slot, next_slot, approach, own, own_wide, counts)
-    set_begun(group, m, machine, own)
-
-
 @compiled
-def push_mesh(group, m, slot, instant, since, q, v, machine, work, wide, near):
+def _push_mesh(group, m, slot, instant, since, q, v, machine, work, wide, near):
     """Evaluate the law of a mesh ``since`` s after the begin of the step and add its forces.
 
     The state is in the blocks ``q`` and ``v``. Forces and margins at the instant are kept.
@@ -234,22 +218,8 @@ def push_mesh(group, m, slot, instant, since, q, v, machine, work, wide, near):
     set_row(own, rows.NORMAL, law.normal)
 
 
-@inlined
-def push_middle(group, m, step, machine, work, wide, near):
-    """Evaluate the law of a mesh in the middle of the step and add its forces."""
-    q, v, since = rows.MIDDLE_Q, rows.MIDDLE_V, 0.5 * step
-    push_mesh(group, m, MIDDLE, MIDDLE_AT, since, q, v, machine, work, wide, near)
-
-
-@inlined
-def push_end(group, m, slot, step, machine, work, wide, near):
-    """Evaluate the law of a mesh at the end of the step and add its forces."""
-    q, v = rows.END_Q, rows.END_V
-    push_mesh(group, m, slot, END_AT, step, q, v, machine, work, wide, near)
-
-
-@inlined
-def end_mesh(group, m, slot, step, machine, work, near):
+@compiled
+def _end_mesh(group, m, slot, step, machine, work, near):
     """Correct the end of the step for the kinks of a mesh, and shift what it remembers."""
     n = width(work)
     mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
@@ -280,22 +250,67 @@ def _correct(group, mesh, m, step, first, last, machine, own):
     correct_by(group, m, short, early, step, changed, machine)
 
 
-@inlined
-def keep_mesh(m, work, wide, near):
+@compiled
+def _keep_mesh(m, work, wide, near):
     """Keep the slot of the next step's begin where a call begins."""
     n = width(work)
     own, own_wide = mesh_rows(work, m, n), wide_rows(wide, m, n)
     keep_begin(own, own_wide, integer_rows(near, m, n))
 
 
-integrate = integrator(
-    begin_mesh=begin_mesh,
-    start_mesh=start_mesh,
-    write_mesh=write_mesh,
-    read_mesh=read_mesh,
-    push_middle=push_middle,
-    push_end=push_end,
-    end_mesh=end_mesh,
-    keep_mesh=keep_mesh,
-)
-integrates(integrate, AnyLawPairGroup, ChordGroup, HelicalPairGroup)
+@final
+class AnyLawMeshes(Law):
+    """Meshes with chords, with up to eight pairs of teeth in contact, or of the paper's law."""
+
+    def begin(self, group, m, slot, fresh, step, machine, work, wide, near):
+        """Read the tables of a mesh at the begin of the first step of a call."""
+        call(_begin_mesh, group, m, slot, fresh, step, machine, work, wide, near)
+
+    def start(self, group, m, slot, fresh, machine, work, wide, near):
+        """Push by a mesh at the begin of a step, and set what it remembers where it is fresh."""
+        call(_start_mesh, group, m, slot, fresh, machine, work, wide, near)
+
+    def write(self, group, m, seen, row, work, wide, near):
+        """Write the state of the pairs of a mesh at the begin of a step."""
+        call(_write_mesh, group, m, seen, row, work, wide, near)
+
+    def read(self, group, m, slot, next_slot, step, machine, work, wide, near):
+        """Read the tables of a mesh at the end of the step, and set those in its middle."""
+        n = width(work)
+        mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
+        own_wide, counts = wide_rows(wide, m, n), integer_rows(near, m, n)
+        approach, rate = motion(group, m, rows.Q, rows.V, machine)
+        ahead = step * get_row(mesh.numbers, layout.PINION_RADIUS)
+        ahead = ahead * mean_speed(group, m, step, machine)
+        set_row(own, AHEAD + next_slot, ahead)
+        call(
+            _read_slots,
+            mesh,
+            slot,
+            next_slot,
+            step,
+            approach,
+            rate,
+            own,
+            own_wide,
+            counts,
+        )
+        set_begun(group, m, machine, own)
+
+    def push_middle(self, group, m, step, machine, work, wide, near):
+        """Evaluate the law of a mesh in the middle of the step and add its forces."""
+        at = MIDDLE, MIDDLE_AT, 0.5 * step, rows.MIDDLE_Q, rows.MIDDLE_V
+        call(_push_mesh, group, m, *at, machine, work, wide, near)
+
+    def push_end(self, group, m, slot, step, machine, work, wide, near):
+        """Evaluate the law of a mesh at the end of the step and add its forces."""
+        at = slot, END_AT, step, rows.END_Q, rows.END_V
+        call(_push_mesh, group, m, *at, machine, work, wide, near)
+
+    def end(self, group, m, slot, step, machine, work, near):
+        """Correct the end of the step for the kinks of a mesh, and shift what it remembers."""
+        call(_end_mesh, group, m, slot, step, machine, work, near)
+
+    def keep(self, m, work, wide, near):
+        """Keep the slot of the next step's begin where a call begins."""
+        call(_keep_mesh, m, work, wide, near)

@@ -10,6 +10,7 @@ from gensig.dynamics._vector import (
     any_above,
     at,
     cells,
+    chosen,
     compiled,
     get_row,
     inlined,
@@ -21,11 +22,11 @@ from gensig.dynamics._vector import (
     truncated,
     width,
 )
-from gensig.dynamics._written import written
+from gensig.dynamics._written import loop, traced, written
 from gensig.dynamics.backends.nystroem import _group as groups
 from gensig.dynamics.backends.nystroem import _layout as rows
-from gensig.dynamics.backends.nystroem._flat import number_at
-from gensig.dynamics.backends.nystroem._group import meshes_of, of
+from gensig.dynamics.backends.nystroem._flat import number_at, rows_of
+from gensig.dynamics.backends.nystroem._group import has_any_law, meshes_of, of
 from gensig.dynamics.backends.nystroem._meshes import touched
 from gensig.dynamics.equations import A_TURN
 
@@ -37,7 +38,7 @@ def profile_rows(group, n):
 
 
 @inlined
-def _cell(group, time, n):
+def cell_at(group, time, n):
     """First row of the profile's cell at a time, and the time since its begin."""
     n_rows = profile_rows(group, n)
     if len(group.profile) == n_rows * n:
@@ -49,12 +50,14 @@ def _cell(group, time, n):
     return cell * n_rows, since
 
 
-@inlined
-def set_rolls(group, time, q, machine, wide):
-    """Set the nominal angle and the roll of every mesh at a time; ``q`` is the block of a state."""
+@traced
+def set_rolls(group, cell, since, q, machine, wide):
+    """Set the nominal angle and the roll of every mesh, ``since`` s into a cell of the profile.
+
+    ``q`` is the block of a state.
+    """
     n = width(machine)
-    n_meshes, profile = meshes_of(group), group.profile
-    cell, since = _cell(group, time, n)
+    profile = group.profile
     for first in range(0, n, EIGHT):
         speed = load_wide(profile, at(cell + groups.SPEED, first, n))
         gain = load_wide(profile, at(cell + groups.GAIN, first, n))
@@ -62,44 +65,50 @@ def set_rolls(group, time, q, machine, wide):
         set_angle = load_wide(profile, at(cell + groups.ANGLE, first, n)) + turned
         turned = set_angle + load_wide(wide, at(layout.CENTER, first, n))
         store(wide, at(layout.NOMINAL, first, n), turned)
-        for m in range(n_meshes):
-            own = of(q, touched(group, m, A_TURN))
-            turning = load_wide(group.turning, at(m, first, n))
-            roll = turned * turning + load_wide(machine, at(own, first, n))
-            if group.prescribed:
-                roll = set_angle * turning
-            exact = m * layout.N_EXACT
-            radius = load_wide(group.exact, at(exact + layout.EXACT_RADIUS, first, n))
-            roll = radius * roll
-            begun = load_wide(group.exact, at(exact + layout.START_ROLL, first, n))
-            base = m * rows.N_WIDE + layout.BASE
-            store(wide, at(base, first, n), begun + roll)
+
+        def roll(m, first=first, set_angle=set_angle, turned=turned):
+            _set_roll(group, m, first, set_angle, turned, q, machine, wide)
+
+        loop(meshes_of(group), roll)
 
 
-@inlined
-def set_forces(group, time, machine, wide):
+def _set_roll(group, m, first, set_angle, turned, q, machine, wide):
+    """Set the roll of a mesh, of eight lanes from one on."""
+    n, exact = width(machine), m * layout.N_EXACT
+    own = load_wide(machine, at(of(q, touched(group, m, A_TURN)), first, n))
+    if has_any_law(group):
+        turned = chosen(group.prescribed, set_angle, turned)
+        own = chosen(group.prescribed, 0.0 * own, own)
+    roll = turned * load_wide(group.turning, at(m, first, n)) + own
+    roll = load_wide(group.exact, at(exact + layout.EXACT_RADIUS, first, n)) * roll
+    begun = load_wide(group.exact, at(exact + layout.START_ROLL, first, n))
+    base = m * rows.N_WIDE + layout.BASE
+    store(wide, at(base, first, n), begun + roll)
+
+
+@traced
+def set_forces(group, cell, since, machine, wide):
     """Set nominal speed and all forces that follow neither meshes, state nor angles."""
-    n = width(machine)
-    n_dof = len(group.force) // n
     profile = group.profile
-    cell, since = _cell(group, time, n)
-    speed = _in_row(profile, cell + groups.SPEED, machine)
-    gain = _in_row(profile, cell + groups.GAIN, machine)
-    center = _in_row(wide, layout.CENTER, machine)
+    speed = in_row(profile, cell + groups.SPEED, machine)
+    gain = in_row(profile, cell + groups.GAIN, machine)
+    center = in_row(wide, layout.CENTER, machine)
     set_row(machine, rows.DRIVE + layout.DRIVE_CENTER, center)
     set_row(machine, rows.DRIVE + layout.DRIVE_SPEED, speed + since * gain)
     set_row(machine, rows.DRIVE + layout.DRIVE_GAIN, gain)
-    for d in range(n_dof):
+
+    def give(d):
         given = get_row(group.force, d) - gain * get_row(group.carried, d)
-        if len(profile) > profile_rows(group, n) * n:
-            row = cell + groups.N_PROFILE + 2 * d
-            given = given + _in_row(profile, row, machine)
-            given = given + since * _in_row(profile, row + 1, machine)
+        row = cell + groups.N_PROFILE + 2 * d
+        given = given + in_row(profile, row, machine)
+        given = given + since * in_row(profile, row + 1, machine)
         set_row(machine, of(rows.FORCES, d), given)
 
+    loop(rows_of(group.force, width(machine)), give)
 
-@inlined
-def _in_row(exact, row, work):
+
+@written
+def in_row(exact, row, work):
     """A float64 row as one of the precision of the scratch."""
     n = width(work)
     low = load_wide(exact, at(row, 0, n))
@@ -114,12 +123,12 @@ def drive(group, begin, since, q, machine, wide):
     ``begin`` is the time of it, ``q`` the block of the state at the instant.
     """
     n, n_sources = width(machine), len(group.sources)
-    cell, in_cell = _cell(group, begin + since, n)
+    cell, in_cell = cell_at(group, begin + since, n)
     row = cell + profile_rows(group, n) - 2 * n_sources
     zero = spread(machine, 0.0)
     for s in range(n_sources):
-        factor = _in_row(group.profile, row + 2 * s, machine)
-        factor = factor + in_cell * _in_row(group.profile, row + 2 * s + 1, machine)
+        factor = in_row(group.profile, row + 2 * s, machine)
+        factor = factor + in_cell * in_row(group.profile, row + 2 * s + 1, machine)
         if any_above(factor * factor, zero):
             d = number_at(group.sources, s)
             torque = factor * _over_angle(group, s, d, since, q, machine, wide)
@@ -127,7 +136,7 @@ def drive(group, begin, since, q, machine, wide):
             set_row(machine, pushed, get_row(machine, pushed) + torque)
 
 
-@inlined
+@written
 def _over_angle(group, s, d, since, q, machine, wide):
     """Number of a source's table at the angle of its degree of freedom, straight between nodes."""
     last = width(machine) - EIGHT

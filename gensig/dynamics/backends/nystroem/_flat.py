@@ -24,6 +24,17 @@ def tail(typing_context, array, first):
 
 
 @intrinsic
+def rows_of(typing_context, array, n):
+    """Rows of ``n`` numbers in a flat array."""
+
+    def build(context, builder, sig, args):
+        size = context.make_array(sig.args[0])(context, builder, args[0]).nitems
+        return builder.udiv(size, args[1])
+
+    return types.intp(array, types.intp), build
+
+
+@intrinsic
 def number_at(typing_context, numbers, place):
     """An integer of a flat array at a place that is not negative."""
 

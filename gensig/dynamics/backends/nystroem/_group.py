@@ -16,7 +16,7 @@ from gensig.dynamics._vector import n_lanes
 from gensig.dynamics._written import type_test, written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._flat import tail
-from gensig.dynamics.equations import N_IN_PLANE
+from gensig.dynamics.equations import N_IN_PLANE, N_MOTIONS
 
 # rows of a cell of ``Group.profile``; behind them follow force and its slope of every degree of
 # freedom, then factor and its slope of every source
@@ -36,7 +36,8 @@ class Group(NamedTuple):
     ``numbers``, ``exact`` and ``indices`` (mesh, row, lane) hold rows as ``_layout`` names them,
     mesh after mesh, as all that belongs to teeth. ``table`` holds, lane after lane, the pairs of
     distinct teeth (pinion's times wheel's, node, [c, c', g, g']). Where those are many it holds
-    the distinct teeth of the pinion and then those of the wheel, and ``WHEEL_ROWS`` is not 0. It
+    the distinct teeth of the pinion and then those of the wheel, ``WHEEL_ROWS`` is not 0, and the
+    group is ``by_tooth``. It
     ends with one cell of a missing pair and one cell of zeros. Helical pairs have ``n_chords``
     chords, one behind the other; spur teeth have one. ``depth`` (mesh, lane, chord) m is the
     penetration from which each chord holds. ``chord_table`` has the layout of the table and holds
@@ -50,9 +51,9 @@ class Group(NamedTuple):
     The machine is M q'' + C q' + K q = f + mesh forces; q is the deviation from nominal rotation.
     The state is q less ``rest`` (dof, lane), a static equilibrium, so that it stays small. Mean
     mesh forces are subtracted from mesh forces: large forces and torques balance before they are
-    rounded. ``touched`` (mesh, n_touched) are the degrees of freedom of a mesh, ``reach``
-    (mesh, n_touched, lane) is the gradient of its approach along them, ``slide``
-    (mesh, n_touched, lane) the direction of its friction; where a gear does not move both are 0,
+    rounded. ``touched`` (mesh, motion) are the degrees of freedom of a mesh, ``reach``
+    (mesh, motion, lane) is the gradient of its approach along them, ``slide``
+    (mesh, motion, lane) the direction of its friction; where a gear does not move both are 0,
     and the first degree of freedom stands there. ``turning`` (mesh, lane) is the rotation of gear
     a with the reference, in float64 like ``exact_rotation`` (dof, lane). ``force`` (dof, lane) is
     what holds neither rest nor mean mesh forces; ``profile`` (cell, row, lane) holds the nominal
@@ -70,7 +71,6 @@ class Group(NamedTuple):
     """
 
     n_meshes: int
-    n_touched: int
     numbers: Any
     exact: Any
     indices: Any
@@ -83,6 +83,7 @@ class Group(NamedTuple):
     tooth_row: Any
     tooth_error: Any
     tooth_tilt: Any
+    by_tooth: bool
     one_sided: bool
     consistent: bool
     prescribed: bool
@@ -125,6 +126,14 @@ class ChordGroup(Group, Helical):
     """Machines of meshes of which some are helical, or have more than three pairs in contact."""
 
 
+class Axial:
+    """Machines whose gears move along their axes and tilt: meshes act on twelve motions."""
+
+
+class AxialChordGroup(ChordGroup, Axial):
+    """Machines of helical meshes whose gears move along their axes and tilt."""
+
+
 class GearPair:
     """Machines of which ``Equations.is_gear_pair`` holds.
 
@@ -144,11 +153,12 @@ class AnyLawPairGroup(Group, GearPair, AnyLaw):
     """Pairs of spur gears of any law and contact ratio."""
 
 
-class HelicalPairGroup(ChordGroup, GearPair):
+class HelicalPairGroup(AxialChordGroup, GearPair):
     """Pairs of helical gears."""
 
 
 is_gear_pair, has_any_law = type_test(GearPair), type_test(AnyLaw)
+is_axial = type_test(Axial)
 
 
 @written
@@ -160,7 +170,7 @@ def meshes_of(group):
 @written
 def motions_of(group):
     """Motions that a mesh acts on."""
-    return group.n_touched if is_helical(group) else N_IN_PLANE
+    return N_MOTIONS if is_axial(group) else N_IN_PLANE
 
 
 class MeshFields(NamedTuple):

@@ -2,13 +2,14 @@
 
 Every number of a record lies in its own lane of a vector, and no instruction mixes lanes or
 reorders sums: a record's bits depend on nothing but its own numbers. Arrays are flat; a row holds
-one number for every record of the group. The machine is here, in loops over meshes and degrees of
-freedom. What a mesh reads, how it pushes and what its kinks miss are functions that
-``integrator`` takes: of ``_spur_meshes`` and of ``_any_law_meshes``.
+one number for every record of the group. The step is written once for a law, in loops over meshes
+and degrees of freedom whose bodies are run once: it is compiled for a law and a precision, not for
+a machine.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 from gensig.dynamics import _layout as layout
@@ -26,15 +27,19 @@ from gensig.dynamics._vector import (
     where_above,
     width,
 )
+from gensig.dynamics._written import call, loop, traced, when
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._course import (
+    cell_at,
     drive,
+    in_row,
     profile_rows,
     set_forces,
     set_rolls,
 )
-from gensig.dynamics.backends.nystroem._flat import number_at
+from gensig.dynamics.backends.nystroem._flat import number_at, rows_of
 from gensig.dynamics.backends.nystroem._group import (
+    is_gear_pair,
     machine_rows,
     mesh_of,
     mesh_rows,
@@ -60,37 +65,192 @@ from gensig.dynamics.backends.nystroem._motion import (
 RECENTER = 256  # steps between two removals of the drift of the rotations, to keep numbers small
 
 
-def integrator(
-    *,
-    begin_mesh: Any,
-    start_mesh: Any,
-    write_mesh: Any,
-    read_mesh: Any,
-    push_middle: Any,
-    push_end: Any,
-    end_mesh: Any,
-    keep_mesh: Any,
-) -> Any:
-    """The core of machines whose meshes have one law.
+class Law(ABC):
+    """Forces of meshes, as code that is written into the step for one mesh ``m``.
 
-    Each function is one of compiled code, for one mesh: at the begin of a call, at the start of
-    its fresh lanes, for the output, at the begin of a step, in its middle, at its end, after it,
-    and at the end of a call.
+    ``work``, ``wide`` and ``near`` are the scratch, ``machine`` the rows of the machine in it.
     """
 
-    @compiled
-    def start(group, slot, fresh, by_tooth, time, work, wide, near):
-        """Set what the step remembers in the lanes that are fresh, from one evaluation there."""
+    @abstractmethod
+    def begin(self, group, m, slot, fresh, step, machine, work, wide, near):
+        """Write what a mesh reads at the begin of a call."""
+
+    @abstractmethod
+    def start(self, group, m, slot, fresh, machine, work, wide, near):
+        """Push by a mesh at the begin of a step, and set what it remembers where it is fresh."""
+
+    @abstractmethod
+    def write(self, group, m, seen, row, work, wide, near):
+        """Write the state of the pairs of a mesh at the begin of a step."""
+
+    @abstractmethod
+    def read(self, group, m, slot, next_slot, step, machine, work, wide, near):
+        """Read what a mesh has where the step will end."""
+
+    @abstractmethod
+    def push_middle(self, group, m, step, machine, work, wide, near):
+        """Add the forces of a mesh in the middle of the step."""
+
+    @abstractmethod
+    def push_end(self, group, m, slot, step, machine, work, wide, near):
+        """Add the forces of a mesh at the end of the step."""
+
+    @abstractmethod
+    def end(self, group, m, slot, step, machine, work, near):
+        """Correct the end of the step for what the rule misses, and shift what a mesh remembers."""
+
+    @abstractmethod
+    def keep(self, m, work, wide, near):
+        """Keep what the next call begins with."""
+
+
+def pull(group, time, since, q, v, has_dampers, has_sources, machine, wide):
+    """Add the forces of springs, dampers, governor and sources, ``since`` s after a step's begin.
+
+    Those of each degree of freedom alone are there.
+    """
+    couple(group, q, v, machine)
+    govern(group, q, v, machine)
+    if not is_gear_pair(group):
+        when(has_dampers, lambda: call(damp, group, v, machine))
+        when(has_sources, lambda: call(drive, group, time, since, q, machine, wide))
+
+
+def integrator(law: Law) -> Any:
+    """The core of machines whose meshes have one law."""
+
+    @traced
+    def pull_at_begin(
+        group, slot, fresh, time, has_dampers, has_sources, work, wide, near
+    ):
         n = width(work)
         machine = machine_rows(work, meshes_of(group), n)
-        pull_at_begin(group, time, machine, wide)
-        for m in range(meshes_of(group)):
-            start_mesh(group, m, slot, fresh, by_tooth, machine, work, wide, near)
-        for lane in range(n):
-            machine[at(rows.FRESH, lane, n)] = fresh[lane]
-        accelerate_fresh(group, get_row(machine, rows.FRESH), machine)
+
+        def alone(d):
+            moved, rate = (get_row(machine, of(name, d)) for name in (rows.Q, rows.V))
+            own_pull(group, d, moved, rate, machine)
+
+        def push(m):
+            law.start(group, m, slot, fresh, machine, work, wide, near)
+
+        loop(rows_of(group.force, n), alone)
+        pull(group, time, 0.0, rows.Q, rows.V, has_dampers, has_sources, machine, wide)
+        loop(meshes_of(group), push)
+
+    @traced
+    def remember(group, machine):
+        """Set what a step remembers to the accelerations at its begin, in the fresh lanes."""
+        flags = get_row(machine, rows.FRESH)
+
+        def accelerations(d):
+            a = acceleration(group, d, machine)
+            for name in (rows.NOW, rows.HALFWAY, rows.BEFORE):
+                choose(flags, of(name, d), a, machine)
+
+        loop(rows_of(group.force, width(machine)), accelerations)
 
     @compiled
+    def start(group, slot, fresh, time, work, wide, near):
+        """Set what the step remembers in the lanes that are fresh, from one evaluation there."""
+        n = width(work)
+        has_dampers, has_sources = len(group.damper_other) > 0, len(group.sources) > 0
+        pull_at_begin(
+            group,
+            slot,
+            fresh,
+            time,
+            has_dampers,
+            has_sources,
+            work,
+            wide,
+            near,
+        )
+        machine = machine_rows(work, meshes_of(group), n)
+        for lane in range(n):
+            machine[at(rows.FRESH, lane, n)] = fresh[lane]
+        remember(group, machine)
+
+    @traced
+    def begin_meshes(group, slot, fresh, step, work, wide, near):
+        machine = machine_rows(work, meshes_of(group), width(work))
+
+        def begin_mesh(m):
+            law.begin(group, m, slot, fresh, step, machine, work, wide, near)
+
+        loop(meshes_of(group), begin_mesh)
+
+    @traced
+    def write_meshes(group, seen, row, work, wide, near):
+        n_meshes = meshes_of(group)
+        loop(
+            n_meshes,
+            lambda m: law.write(group, m, seen, row * n_meshes + m, work, wide, near),
+        )
+
+    @traced
+    def keep_meshes(group, work, wide, near):
+        loop(meshes_of(group), lambda m: law.keep(m, work, wide, near))
+
+    @traced
+    def advance(
+        group,
+        time,
+        step,
+        slot,
+        next_slot,
+        has_dampers,
+        has_sources,
+        lost,
+        channels,
+        n_channels,
+        out,
+        out_first,
+        work,
+        wide,
+        near,
+    ):
+        """A step behind the rolls and forces at its begin."""
+        n, n_meshes = width(work), meshes_of(group)
+        n_dof, machine = rows_of(group.force, n), machine_rows(work, n_meshes, n)
+
+        def read(m):
+            count_lost(lost, m, mesh_rows(work, m, n))
+            law.read(group, m, slot, next_slot, step, machine, work, wide, near)
+
+        def go_to_middle(d):
+            own_pull(group, d, *to_middle(d, step, machine), machine)
+
+        def push_middle(m):
+            law.push_middle(group, m, step, machine, work, wide, near)
+
+        def go_to_end(d):
+            a = acceleration(group, d, machine)
+            own_pull(group, d, *predict(d, a, step, machine), machine)
+
+        def push_end(m):
+            law.push_end(group, m, next_slot, step, machine, work, wide, near)
+
+        def finish(d):
+            conclude(d, acceleration(group, d, machine), step, machine)
+
+        def pull_from(q, v, since):
+            pull(group, time, since, q, v, has_dampers, has_sources, machine, wide)
+
+        loop(n_meshes, read)
+        loop(n_dof, go_to_middle)
+        pull_from(rows.MIDDLE_Q, rows.MIDDLE_V, 0.5 * step)
+        loop(n_meshes, push_middle)
+        loop(n_dof, go_to_end)
+        pull_from(rows.END_Q, rows.END_V, step)
+        loop(n_meshes, push_end)
+        loop(n_dof, finish)
+        loop(
+            n_meshes,
+            lambda m: law.end(group, m, next_slot, step, machine, work, near),
+        )
+        write_means(group, channels, n_channels, out, out_first, machine)
+
+    @inlined
     def integrate(
         group,
         state,
@@ -110,90 +270,63 @@ def integrator(
         wide,
         near,
     ):
-        """Advance every lane by ``n_steps``; parameters are those of ``_record_kernels.integrate``.
+        """Advance every lane by ``n_steps``; parameters are those of ``_record_kernels.recorder``.
 
         ``lost`` has one row for every mesh. ``angle`` takes as many rows a sample as the group has
         angles, ``seen`` the rows of every mesh.
         """
         n = width(work)
-        n_dof, n_meshes = len(group.force) // n, meshes_of(group)
-        n_channels = len(channels) if out_row >= 0 else 0
-        machine = machine_rows(work, n_meshes, n)
+        machine = machine_rows(work, meshes_of(group), n)
         begin(group, step, state, work)
-        starting, by_tooth = is_any_fresh(fresh, n), has_teeth_apart(group, n)
+        starting = is_any_fresh(fresh, n)
+        has_dampers, has_sources = len(group.damper_other) > 0, len(group.sources) > 0
+        n_channels = len(channels) if out_row >= 0 else 0
+        is_changing = len(group.profile) > profile_rows(group, n) * n
         slot, next_slot = EVEN, ODD
         for number in range(first_step, first_step + n_steps):
-            begin_step(group, number, number == first_step, step, machine, wide)
-            if number == first_step:
-                for m in range(n_meshes):
-                    begin_mesh(group, m, slot, fresh, step, machine, work, wide, near)
+            time, is_first = number * step, number == first_step
+            is_recentred = number % RECENTER == 0
+            if is_recentred:
+                recenter(group, machine, wide)
+            cell, since = cell_at(group, time, n)
+            set_rolls(group, cell, since, rows.Q, machine, wide)
+            if is_changing or is_recentred or is_first:
+                set_forces(group, cell, since, machine, wide)
+            if is_first:
+                begin_meshes(group, slot, fresh, step, work, wide, near)
                 if starting:
-                    time = number * step
-                    start(group, slot, fresh, by_tooth, time, work, wide, near)
+                    start(group, slot, fresh, time, work, wide, near)
             if angle_row >= 0 and number % per_angle == 0:
                 write_angles(group, angle, angle_row, machine, wide)
                 if len(seen) > 0:
-                    for m in range(n_meshes):
-                        seen_row = angle_row * n_meshes + m
-                        write_mesh(group, m, seen, seen_row, work, wide, near)
+                    write_meshes(group, seen, angle_row, work, wide, near)
                 angle_row += 1
-            for m in range(n_meshes):
-                count_lost(lost, m, mesh_rows(work, m, n))
-                read_mesh(
-                    group, m, slot, next_slot, step, by_tooth, machine, work, wide, near
-                )
-            for d in range(n_dof):
-                moved, rate = to_middle(d, step, machine)
-                own_pull(group, d, moved, rate, machine)
-            couple(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
-            if len(group.damper_other) > 0:
-                damp(group, rows.MIDDLE_V, machine)
-            govern(group, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
-            if len(group.sources) > 0:
-                drive(group, number * step, 0.5 * step, rows.MIDDLE_Q, machine, wide)
-            for m in range(n_meshes):
-                push_middle(group, m, step, machine, work, wide, near)
-            for d in range(n_dof):
-                a = acceleration(group, d, machine)
-                moved, rate = predict(d, a, step, machine)
-                own_pull(group, d, moved, rate, machine)
-            couple(group, rows.END_Q, rows.END_V, machine)
-            if len(group.damper_other) > 0:
-                damp(group, rows.END_V, machine)
-            govern(group, rows.END_Q, rows.END_V, machine)
-            if len(group.sources) > 0:
-                drive(group, number * step, step, rows.END_Q, machine, wide)
-            for m in range(n_meshes):
-                push_end(group, m, next_slot, step, machine, work, wide, near)
-            for d in range(n_dof):
-                a = acceleration(group, d, machine)
-                conclude(d, a, step, machine)
-            for m in range(n_meshes):
-                end_mesh(group, m, next_slot, step, machine, work, near)
-            out_first = (out_row + number - first_step) * n_channels
-            write_means(group, channels, n_channels, out, out_first, machine)
+            advance(
+                group,
+                time,
+                step,
+                slot,
+                next_slot,
+                has_dampers,
+                has_sources,
+                lost,
+                channels,
+                n_channels,
+                out,
+                (out_row + number - first_step) * n_channels,
+                work,
+                wide,
+                near,
+            )
             slot, next_slot = next_slot, slot
         if slot == ODD:
-            for m in range(n_meshes):
-                keep_mesh(m, work, wide, near)
+            keep_meshes(group, work, wide, near)
         end(group, state, machine)
         return angle_row
 
     return integrate
 
 
-@inlined
-def has_teeth_apart(group, n):
-    """True if a mesh of any lane stores its teeth one by one."""
-    by_tooth = False
-    for lane in range(n):
-        for m in range(meshes_of(group)):
-            wheel_rows = at(m * layout.N_INDICES + layout.WHEEL_ROWS, lane, n)
-            by_tooth = by_tooth or group.indices[wheel_rows] > 0
-    return by_tooth
-
-
-@inlined
 def count_lost(lost, m, own):
     """Count a step in which a mesh has no contact."""
     zero, one = spread(own, 0.0), spread(own, 1.0)
@@ -202,23 +335,27 @@ def count_lost(lost, m, own):
     set_row(lost, m, get_row(lost, m) + apart)
 
 
-@inlined
+@traced
 def begin(group, step, state, work):
     """Set the rows that stay as they are, and those of the state."""
-    n = width(work)
-    n_dof, n_meshes = len(group.force) // n, meshes_of(group)
-    machine = machine_rows(work, n_meshes, n)
-    for d in range(n_dof):
+    n, n_meshes = width(work), meshes_of(group)
+    n_dof, machine = rows_of(group.force, n), machine_rows(work, n_meshes, n)
+
+    def take(d):
         set_row(machine, of(rows.Q, d), get_row(state, d))
         set_row(machine, of(rows.V, d), get_row(state, n_dof + d))
-    for m in range(n_meshes):
+
+    def keep(m):
         mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
         turn = 1.0 / get_row(mesh.numbers, layout.PER_FRICTION_WIDTH)
         set_row(own, rows.FRICTION_WIDTH, turn)
         most = DAMPER_SHARE / (step * mesh_mobility(group, m, work))
         set_row(own, layout.MOST_DAMPER, most)
-        for lane in range(n):
-            own[at(rows.BEND, lane, n)] = mesh.bend[lane * layout.COLUMNS]
+        nodes = in_row(mesh.exact, layout.NODES_PER_METER, work)
+        set_row(own, rows.BEND, 0.5 / nodes)
+
+    loop(n_dof, take)
+    loop(n_meshes, keep)
 
 
 @inlined
@@ -230,93 +367,62 @@ def is_any_fresh(fresh, n):
     return starting
 
 
-@inlined
-def begin_step(group, number, is_first, step, machine, wide):
-    """Set rolls and forces at the begin of a step, ``is_first`` of its call."""
-    n = width(machine)
-    is_recentred = number % RECENTER == 0
-    if is_recentred:
-        recenter(group, machine, wide)
-    set_rolls(group, number * step, rows.Q, machine, wide)
-    is_changing = len(group.profile) > profile_rows(group, n) * n
-    if is_changing or is_recentred or is_first:
-        set_forces(group, number * step, machine, wide)
-
-
-@inlined
 def write_means(group, channels, n_channels, out, first, machine):
     """Write the mean accelerations of a step to rows from ``first`` on."""
     gain = get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
-    for c in range(n_channels):
+
+    def mean(c):
         d = number_at(channels, c)
         carried = gain * get_row(group.rotation, d)
         set_row(out, first + c, get_row(machine, of(rows.MEAN, d)) + carried)
 
+    loop(n_channels, mean)
 
-@inlined
+
+@traced
 def end(group, state, machine):
     """Keep the state behind the last step of a call."""
-    n_dof = len(group.force) // width(machine)
-    for d in range(n_dof):
+    n_dof = rows_of(group.force, width(machine))
+
+    def keep(d):
         set_row(state, d, get_row(machine, of(rows.Q, d)))
         set_row(state, n_dof + d, get_row(machine, of(rows.V, d)))
 
+    loop(n_dof, keep)
 
-@inlined
+
+@traced
 def recenter(group, machine, wide):
     """Move the turn of the reference from all rotations of the state into ``CENTER``.
 
     Only the governor's spring depends on a common rotation.
     """
-    n = width(machine)
-    n_dof = len(group.force) // n
-    reference = of(rows.Q, group.reference)
+    n, reference = width(machine), of(rows.Q, group.reference)
     turn = get_row(machine, reference)
     for first in range(0, n, EIGHT):
         turned = load_wide(machine, at(reference, first, n))
         center = load_wide(wide, at(layout.CENTER, first, n))
         store(wide, at(layout.CENTER, first, n), center + turned)
-    for d in range(n_dof):
-        moved = turn * get_row(group.rotation, d)
+
+    def move(d):
         place = of(rows.Q, d)
+        moved = turn * get_row(group.rotation, d)
         set_row(machine, place, get_row(machine, place) - moved)
 
-
-@inlined
-def pull_at_begin(group, time, machine, wide):
-    """Set all forces but those of meshes from the state at the begin of a step."""
-    q, v = rows.Q, rows.V
-    for d in range(len(group.force) // width(machine)):
-        moved, rate = get_row(machine, of(q, d)), get_row(machine, of(v, d))
-        own_pull(group, d, moved, rate, machine)
-    couple(group, q, v, machine)
-    if len(group.damper_other) > 0:
-        damp(group, v, machine)
-    govern(group, q, v, machine)
-    if len(group.sources) > 0:
-        drive(group, time, 0.0, q, machine, wide)
+    loop(rows_of(group.force, n), move)
 
 
-@inlined
-def accelerate_fresh(group, flags, machine):
-    """Set what a step remembers to the accelerations at its begin, where flags are above 0."""
-    for d in range(len(group.force) // width(machine)):
-        a = acceleration(group, d, machine)
-        choose(flags, of(rows.NOW, d), a, machine)
-        choose(flags, of(rows.HALFWAY, d), a, machine)
-        choose(flags, of(rows.BEFORE, d), a, machine)
-
-
-@inlined
+@traced
 def write_angles(group, angle, row, machine, wide):
     """Write the angles of a group at the begin of a step."""
-    n = width(machine)
-    n_angles = len(group.angles)
-    for k in range(n_angles):
+    n, n_angles = width(machine), rows_of(group.angles, 1)
+
+    def write(k):
         d = number_at(group.angles, k)
-        own = of(rows.Q, d)
         for first in range(0, n, EIGHT):
             turned = load_wide(wide, at(layout.NOMINAL, first, n))
             turned = turned * load_wide(group.exact_rotation, at(d, first, n))
-            turned = turned + load_wide(machine, at(own, first, n))
+            turned = turned + load_wide(machine, at(of(rows.Q, d), first, n))
             store(angle, at(row * n_angles + k, first, n), turned)
+
+    loop(n_angles, write)

@@ -6,17 +6,18 @@ and end of the step. The force is its positive part, whose moments Simpson's rul
 
 from __future__ import annotations
 
+from functools import partial
+
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._vector import (
     any_above,
     chosen,
     get_row,
-    inlined,
     set_row,
     spread,
     where_above,
 )
-from gensig.dynamics._written import written
+from gensig.dynamics._written import traced, when, written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._law import arm
 from gensig.dynamics.backends.nystroem._layout import (
@@ -174,7 +175,7 @@ def _give(j, changed, shared, work):
         set_row(work, rows.EARLY + i, get_row(work, rows.EARLY + i) + more)
 
 
-@inlined
+@traced
 def miss(numbers, changed, work):
     """Set what Simpson's rule misses of the force of every pair; other loaded pairs give way.
 
@@ -184,12 +185,8 @@ def miss(numbers, changed, work):
     for j in range(FOLLOWED):
         set_row(work, rows.SHORT + j, zero)
         set_row(work, rows.EARLY + j, zero)
-    if any_above(changed[0], zero):
-        _give(0, changed[0], shared, work)
-    if any_above(changed[1], zero):
-        _give(1, changed[1], shared, work)
-    if any_above(changed[2], zero):
-        _give(2, changed[2], shared, work)
+    for j, mark in enumerate(changed):
+        when(any_above(mark, zero), partial(_give, j, mark, shared, work))
 
 
 @written

@@ -11,7 +11,6 @@ from gensig.dynamics._vector import (
     chosen,
     fused,
     get_row,
-    inlined,
     set_row,
     spread,
     where_above,
@@ -108,7 +107,7 @@ def _pair(numbers, nodes, instant, j, bite, spring, bent, rate, roll_rate, work)
     return force, rubbed, turned, along
 
 
-@inlined
+@written
 def mesh_law(
     group, nodes, instant, ahead, turned, approach, rate, roll_rate, work, wide
 ):

@@ -38,9 +38,10 @@ FRESH = FRICTION_WIDTH + 1  # 1 where rows are being set anew
 SHORT = FRESH + 1
 EARLY = SHORT + FOLLOWED
 DRIVE = EARLY + FOLLOWED
+PULL = DRIVE + layout.N_DRIVE  # of the governor
 # of meshes of any law: 1 where kinks are corrected; and blocks of a row per pair: margins at begin,
 # middle and end of the step, damping in its middle, and the corrections by kinks
-ANY_MISSED = DRIVE + layout.N_DRIVE
+ANY_MISSED = PULL + 1
 ANY_MARGIN = ANY_MISSED + 1
 ANY_DAMPED = ANY_MARGIN + N_INSTANTS * layout.MOST_PAIRS
 ANY_SHORT = ANY_DAMPED + layout.MOST_PAIRS

@@ -8,14 +8,13 @@ from gensig.dynamics._vector import (
     compiled,
     fused,
     get_row,
-    inlined,
     set_row,
     spread,
     where_above,
 )
-from gensig.dynamics._written import written
+from gensig.dynamics._written import loop, traced, written
 from gensig.dynamics.backends.nystroem import _layout as rows
-from gensig.dynamics.backends.nystroem._flat import number_at
+from gensig.dynamics.backends.nystroem._flat import number_at, rows_of
 from gensig.dynamics.backends.nystroem._group import (
     has_any_law,
     is_gear_pair,
@@ -30,7 +29,6 @@ from gensig.dynamics.equations import (
     B_TURN,
     B_X,
     B_Y,
-    N_IN_PLANE,
 )
 
 # in a gear pair, whose y is the line of action: gradient of the approach along y
@@ -44,52 +42,28 @@ def choose(flags, row, value, work):
     set_row(work, row, where_above(flags, zero, value, get_row(work, row)))
 
 
-@inlined
+@written
 def motion(group, m, q, v, machine):
     """Approach of a mesh and its rate, from the rows of a state."""
-    approach, rate = _motion_in_plane(group, m, q, v, machine)
-    for k in range(N_IN_PLANE, motions_of(group)):
-        reach = reach_along(group, m, k)
-        approach, rate = _moved(group, m, k, reach, approach, rate, q, v, machine)
-    return approach, rate
-
-
-@written
-def _motion_in_plane(group, m, q, v, machine):
     row = m * layout.N_NUMBERS + layout.REST_APPROACH
     approach, rate = get_row(group.numbers, row), spread(machine, 0.0)
-    for k in range(N_IN_PLANE):
+    for k in range(motions_of(group)):
         if not _is_across(group, k):
-            reach = _reach_in_plane(group, m, k)
-            approach, rate = _moved(group, m, k, reach, approach, rate, q, v, machine)
+            d, reach = touched(group, m, k), _reach(group, m, k)
+            approach = fused(reach, get_row(machine, of(q, d)), approach)
+            rate = fused(reach, get_row(machine, of(v, d)), rate)
     return approach, rate
 
 
-@written
-def _moved(group, m, k, reach, approach, rate, q, v, machine):
-    """Approach and rate with a motion that the mesh acts on."""
-    d = touched(group, m, k)
-    approach = fused(reach, get_row(machine, of(q, d)), approach)
-    return approach, fused(reach, get_row(machine, of(v, d)), rate)
-
-
-@written
 def _is_across(group, k):
-    """True where a motion in the plane is known to be across the line of action."""
+    """True where a motion is known to be across the line of action."""
     return is_gear_pair(group) and k in (A_X, B_X)
 
 
-@written
-def _reach_in_plane(group, m, k):
-    """Gradient of the approach along a motion in the plane; a number where it is known."""
+def _reach(group, m, k):
+    """Gradient of the approach of a mesh along one motion; a number where it is known."""
     if is_gear_pair(group) and k in REACH_OF_PAIR:
         return REACH_OF_PAIR[k]
-    return reach_along(group, m, k)
-
-
-@written
-def reach_along(group, m, k):
-    """Gradient of the approach of a mesh along one of the motions that it acts on."""
     return get_row(group.reach, m * motions_of(group) + k)
 
 
@@ -101,12 +75,12 @@ def touched(group, m, k):
     return number_at(group.touched, m * motions_of(group) + k)
 
 
-@inlined
+@written
 def mesh_mobility(group, m, machine):
     """Acceleration of the approach of a mesh by its own force, 1/kg."""
     moved = spread(machine, 0.0)
     for k in range(motions_of(group)):
-        reach = reach_along(group, m, k)
+        reach = get_row(group.reach, m * motions_of(group) + k)
         mass = get_row(group.inverse_mass, touched(group, m, k))
         moved = fused(reach * reach, mass, moved)
     return moved
@@ -163,44 +137,22 @@ def rolled(group, m, since, q, machine, own):
     return get_row(group.numbers, row) * with_reference(group, m, turned, moved)
 
 
-@inlined
+@traced
 def push(group, m, law, machine):
     """Add the forces of a mesh to the sums of all forces."""
-    normal = _above_mean(group, m, law.normal)
-    _push_in_plane(group, m, normal, law, machine)
-    for k in range(N_IN_PLANE, motions_of(group)):
-        _push(group, m, k, _on_axis(group, m, k, normal), machine)
+    mean = get_row(group.numbers, m * layout.N_NUMBERS + layout.MEAN_FORCE)
+    normal = law.normal - mean
+    for k in range(motions_of(group)):
+        pushed = of(rows.ON, touched(group, m, k))
+        force = _along(group, m, k, normal, law)
+        set_row(machine, pushed, get_row(machine, pushed) + force)
 
 
-@written
-def _above_mean(group, m, normal):
-    return normal - get_row(group.numbers, m * layout.N_NUMBERS + layout.MEAN_FORCE)
-
-
-@written
-def _push_in_plane(group, m, normal, law, machine):
-    for k in range(N_IN_PLANE):
-        _push(group, m, k, _in_plane(group, m, k, normal, law), machine)
-
-
-@written
-def _push(group, m, k, force, machine):
-    pushed = of(rows.ON, touched(group, m, k))
-    set_row(machine, pushed, get_row(machine, pushed) + force)
-
-
-@written
-def _on_axis(group, m, k, normal):
-    """Force of a mesh along a motion out of the plane."""
-    return 0.0 - reach_along(group, m, k) * normal
-
-
-@written
-def _in_plane(group, m, k, normal, law):
-    """Force of a mesh law along a motion in the plane."""
+def _along(group, m, k, normal, law):
+    """Force of a mesh law along one of the motions that the mesh acts on."""
     if _is_across(group, k):
         return law.friction if k == A_X else 0.0 - law.friction
-    force = 0.0 - _reach_in_plane(group, m, k) * normal
+    force = 0.0 - _reach(group, m, k) * normal
     if not is_gear_pair(group):
         slide = get_row(group.slide, m * motions_of(group) + k)
         force = fused(slide, law.friction, force)
@@ -212,56 +164,42 @@ def _in_plane(group, m, k, normal, law):
     return force
 
 
-@inlined
+@traced
 def correct_by(group, m, short, early, step, changed, machine):
     """Add to the end of the step what a mesh misses of the mean of its law, and early in it."""
-    _correct_in_plane(group, m, short, early, step, changed, machine)
-    for k in range(N_IN_PLANE, motions_of(group)):
-        forces = (
-            _on_axis(group, m, k, short.normal),
-            _on_axis(group, m, k, early.normal),
-        )
-        _correct(group, m, k, forces, step, changed, machine)
+    for k in range(motions_of(group)):
+        d, force = touched(group, m, k), _along(group, m, k, short.normal, short)
+        add_force(group, d, force, 1.0, changed, of(rows.MEAN, d), machine)
+        add_force(group, d, force, step, changed, of(rows.V, d), machine)
+        force = _along(group, m, k, early.normal, early)
+        add_force(group, d, force, step * step, changed, of(rows.Q, d), machine)
 
 
-@written
-def _correct_in_plane(group, m, short, early, step, changed, machine):
-    for k in range(N_IN_PLANE):
-        forces = tuple(
-            _in_plane(group, m, k, law.normal, law) for law in (short, early)
-        )
-        _correct(group, m, k, forces, step, changed, machine)
-
-
-@written
-def _correct(group, m, k, forces, step, changed, machine):
-    """Add what is missed of the force along a motion, of its mean and early in the step."""
-    d, (short, early) = touched(group, m, k), forces
-    add_force(group, d, short, 1.0, changed, of(rows.MEAN, d), machine)
-    add_force(group, d, short, step, changed, of(rows.V, d), machine)
-    add_force(group, d, early, step * step, changed, of(rows.Q, d), machine)
-
-
-@inlined
+@traced
 def govern(group, q, v, machine):
     """Add the pull of the governor, which feels the rigid motion alone, from a state.
 
     ``CENTER`` is the rigid motion that the state does not hold.
     """
+    n_held = rows_of(group.held_dofs, 1)
     center = get_row(machine, rows.DRIVE + layout.DRIVE_CENTER)
-    moved, slowed = spread(machine, 0.0), spread(machine, 0.0)
-    for k in range(len(group.held_dofs)):
+    set_row(machine, rows.PULL, spread(machine, 0.0))
+
+    def feel(k):
         d = number_at(group.held_dofs, k)
-        held = get_row(group.held, d)
+        held, slowed = get_row(group.held, d), get_row(group.held_damping, 0)
         turned = fused(center, get_row(group.rotation, d), get_row(machine, of(q, d)))
-        moved = fused(held, turned, moved)
-        slowed = fused(held, get_row(machine, of(v, d)), slowed)
-    pull = fused(get_row(group.held_damping, 0), slowed, moved)
-    for k in range(len(group.held_dofs)):
+        turned = fused(slowed, get_row(machine, of(v, d)), turned)
+        set_row(machine, rows.PULL, fused(held, turned, get_row(machine, rows.PULL)))
+
+    def hold(k):
         d = number_at(group.held_dofs, k)
         pulled = of(rows.ON, d)
-        held = get_row(group.held, d) * pull
+        held = get_row(group.held, d) * get_row(machine, rows.PULL)
         set_row(machine, pulled, get_row(machine, pulled) - held)
+
+    loop(n_held, feel)
+    loop(n_held, hold)
 
 
 @written
@@ -273,22 +211,20 @@ def own_pull(group, d, moved, rate, machine):
     set_row(machine, of(rows.ON, d), force)
 
 
-@inlined
-def couple(group, states, rates, machine):
+@traced
+def couple(group, q, v, machine):
     """Add the forces of springs and dampers between two degrees of freedom."""
-    for k in range(len(group.coupled) // 2):
+
+    def join(k):
         a, b = number_at(group.coupled, 2 * k), number_at(group.coupled, 2 * k + 1)
-        _couple(group, k, a, b, states, rates, machine)
+        sprung, damped = get_row(group.sprung, k), get_row(group.damped, k)
+        for one, other in ((a, b), (b, a)):
+            spring = sprung * get_row(machine, of(q, other))
+            spring = fused(damped, get_row(machine, of(v, other)), spring)
+            pulled = of(rows.ON, one)
+            set_row(machine, pulled, get_row(machine, pulled) - spring)
 
-
-@written
-def _couple(group, k, a, b, q, v, machine):
-    sprung, damped = get_row(group.sprung, k), get_row(group.damped, k)
-    for one, other in ((a, b), (b, a)):
-        spring = sprung * get_row(machine, of(q, other))
-        spring = fused(damped, get_row(machine, of(v, other)), spring)
-        pulled = of(rows.ON, one)
-        set_row(machine, pulled, get_row(machine, pulled) - spring)
+    loop(rows_of(group.coupled, 2), join)
 
 
 @compiled

@@ -14,7 +14,6 @@ from gensig.dynamics._vector import (
     compiled,
     fused,
     get_row,
-    inlined,
     joined,
     load_wide,
     lower,
@@ -26,7 +25,7 @@ from gensig.dynamics._vector import (
     where_above,
     width,
 )
-from gensig.dynamics._written import written
+from gensig.dynamics._written import any_of, either, traced, written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._layout import FOLLOWED, N_NODE, PER_COMPLIANCE
 
@@ -36,12 +35,10 @@ OUT_OF_MESH = -1.0  # N: margin of a pair that was not followed before
 SURELY_SLIDING = 1.0 - 1e-6  # product of directions above which both are the same
 
 
-@inlined
+@written
 def locate(group, work, wide):
     """Set the positions of all pairs; true if one has left the path in any lane."""
-    n, left = width(work), False
-    reach = spread(wide, 0.0)
-    exact = group.exact
+    n, exact, has_left = width(work), group.exact, []
     for first in range(0, n, EIGHT):
         roll = load_wide(wide, at(layout.BASE, first, n))
         pitch = load_wide(exact, at(layout.PITCH, first, n))
@@ -51,8 +48,8 @@ def locate(group, work, wide):
             number = load_wide(wide, at(rows.NUMBER + j, first, n))
             position = roll - number * pitch
             store(wide, at(rows.POSITION + j, first, n), position)
-            left = left or any_above(position, reach)
-    return left
+            has_left.append(any_above(position, reach))
+    return any_of(*has_left)
 
 
 @compiled
@@ -198,17 +195,18 @@ def _in_cell(group, j, place, part, nodes, work):
     return c, PER_COMPLIANCE * soft, g, rise + tilt
 
 
-@inlined
 def _read(group, by_tooth, j, ahead, work, wide):
     """Place of a pair ``ahead`` of the step, share of its cell, and the nodes of the cell."""
     place, part, cell, last_cell = _find_all(group, j, ahead, work, wide)
     at_row, per_row = rows.AT_PINION + j, rows.PER_CELL + j
     nodes = _read_cells(group, at_row, per_row, cell, last_cell, work, wide)
-    if by_tooth:
+
+    def with_wheel():
         at_row, per_row = rows.AT_WHEEL + j, rows.PER_WHEEL_CELL + j
         more = _read_cells(group, at_row, per_row, cell, last_cell, work, wide)
-        nodes = _sums(nodes, more)
-    return place, part, nodes
+        return _sums(nodes, more)
+
+    return place, part, either(by_tooth, with_wheel, nodes)
 
 
 @written
@@ -236,7 +234,7 @@ def _set_fresh(row, value, work):
     set_row(work, row, where_above(fresh, zero, value, get_row(work, row)))
 
 
-@inlined
+@traced
 def read_begin(group, by_tooth, j, work, wide):
     """Read a pair at the begin of the step, in the lanes that ``FRESH`` marks."""
     behind = get_row(work, rows.BEHIND)
@@ -267,7 +265,7 @@ def _cubic(before, after, slope_before, slope_after, span, per_span):
     return fused(CUBIC_MIDDLE.value_by_values, before + after, bend), slope
 
 
-@inlined
+@traced
 def read_step(group, by_tooth, j, ahead, span, per_span, work, wide):
     """Set the rows of a pair in the middle of the step, and then those at its end.
 

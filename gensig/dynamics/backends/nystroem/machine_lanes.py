@@ -17,6 +17,7 @@ from gensig.dynamics._vector import aligned
 from gensig.dynamics.backends.nystroem import _group as groups
 from gensig.dynamics.backends.nystroem._group import (
     AnyLawPairGroup,
+    AxialChordGroup,
     ChordGroup,
     Group,
     HelicalPairGroup,
@@ -24,7 +25,7 @@ from gensig.dynamics.backends.nystroem._group import (
     SpurPairGroup,
 )
 from gensig.dynamics.backends.nystroem._pairs import MISSING_COMPLIANCE, MISSING_GAP
-from gensig.dynamics.equations import A_TURN, Dynamics, Equations
+from gensig.dynamics.equations import A_TURN, N_MOTIONS, Dynamics, Equations
 from gensig.dynamics.lanes import (
     MeshLanes,
     ToothRows,
@@ -65,7 +66,10 @@ def group_kind(equations: Equations) -> type[Group]:
         return SpurPairGroup if is_pair else SpurGroup
     if is_pair and isinstance(all_teeth[0].table, PairTable):
         return AnyLawPairGroup
-    return HelicalPairGroup if is_pair else ChordGroup
+    if is_pair:
+        return HelicalPairGroup
+    n_motions = len(equations.meshes[0].touched)
+    return AxialChordGroup if n_motions == N_MOTIONS else ChordGroup
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,7 +159,6 @@ def _meshes(
     options = first[0].teeth.table.options
     return {
         "n_meshes": len(meshes),
-        "n_touched": touched.shape[1],
         "numbers": side_by_side(np.array(numbers), precision),
         "exact": np.concatenate([mesh.exact.T.ravel() for mesh in meshes]),
         "indices": np.concatenate(indices),
@@ -170,6 +173,7 @@ def _meshes(
         "tooth_row": joined("tooth_row"),
         "tooth_error": joined("tooth_error"),
         "tooth_tilt": joined("tooth_tilt"),
+        "by_tooth": any(mesh.indices[:, layout.WHEEL_ROWS].any() for mesh in meshes),
         "one_sided": options.law == "one_sided",
         "consistent": options.roll_torque == "consistent",
         "prescribed": options.phase == "prescribed",

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
 from typing import Any, final
 
+from gensig.dynamics._record_kernels import recorder
 from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.backends.base import Backend, Integration, Motions
 from gensig.dynamics.backends.group_motions import in_order, integrate_machines
 from gensig.dynamics.backends.group_run import Core
-from gensig.dynamics.backends.nystroem import _any_law_meshes, _spur_meshes
+from gensig.dynamics.backends.nystroem._any_law_meshes import AnyLawMeshes
 from gensig.dynamics.backends.nystroem._group import SpurGroup, scratch
+from gensig.dynamics.backends.nystroem._kernels import Law, integrator
+from gensig.dynamics.backends.nystroem._spur_meshes import SpurMeshes
 from gensig.dynamics.backends.nystroem.machine_lanes import group_kind, pack
 from gensig.dynamics.backends.nystroem.stability import stable_rate
 from gensig.dynamics.backends.step_limits import (
@@ -32,11 +34,19 @@ def coarsest_oversampling(
     return min(oversampling, math.ceil(least))
 
 
-_core = partial(
-    Core, pack=pack, scratch=scratch, coarsest_oversampling=coarsest_oversampling
-)
-THREE_PAIRS = _core(integrate=_spur_meshes.integrate)
-ANY_LAW = _core(integrate=_any_law_meshes.integrate)
+def _core(law: Law) -> Core:
+    """The core of machines whose meshes have one law."""
+    integrate = integrator(law)
+    return Core(
+        pack=pack,
+        scratch=scratch,
+        integrate=integrate,
+        record=recorder(integrate),
+        coarsest_oversampling=coarsest_oversampling,
+    )
+
+
+THREE_PAIRS, ANY_LAW = _core(SpurMeshes()), _core(AnyLawMeshes())
 
 
 def core_of(kind: type[Any]) -> Core:
