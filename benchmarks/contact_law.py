@@ -27,7 +27,6 @@ from benchmarks._mesh_numbers import mesh_numbers
 from gensig.dynamics._vector import LANES
 from gensig.dynamics.decimation import decimator
 from gensig.dynamics.pair import PairDynamics
-from gensig.dynamics.system import eigenvalues
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.faults.registry import read_faults
 from gensig.mesh.face import slice_gaps
@@ -255,9 +254,7 @@ def static(this: Case, law: str) -> tuple[Array, Array]:
 
 def resonance(this: Case, stiffness: float) -> float:
     """Natural frequency of the mesh mode, Hz."""
-    values = eigenvalues(
-        this.dynamics.system(), this.dynamics.approach_direction(), stiffness
-    )
+    values = this.dynamics.equations.rates(np.array([stiffness]))
     return float(np.abs(values.imag).max() / (2.0 * math.pi))
 
 

@@ -48,7 +48,7 @@ class Code:
         """A number that is known, a tuple of values, or a ``Value``: Python calculates with it."""
         if isinstance(kind, types.Literal):
             return kind.literal_value
-        if isinstance(kind, types.UniTuple):
+        if isinstance(kind, (types.Tuple, types.UniTuple)):
             return tuple(self._parts(kind, llvm))
         if isinstance(kind, types.NamedUniTuple):
             return kind.instance_class(*self._parts(kind, llvm))

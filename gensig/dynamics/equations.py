@@ -5,8 +5,10 @@ Gear pairs and drive lines are integrated by these alone.
 
 from __future__ import annotations
 
+import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +22,9 @@ Array = NDArray[np.float64]
 A_X, A_Y, A_TURN, B_X, B_Y, B_TURN, N_IN_PLANE = range(7)
 N_MOTIONS = 12  # of helical gears
 NONE = -1  # for a gear that does not move so
+LONGEST_SETTLING = 0.45  # s
+SETTLED = 1e-4  # share of the start's transient that is left
+STIFFER = 1.2  # than their mean stiffness are meshes taken for the longest step
 # of the first six in a gear pair, whose y is the line of action
 PAIR_SLIDE = (1.0, 0.0, 0.0, -1.0, 0.0, 0.0)
 
@@ -59,6 +64,19 @@ class Mesh:
         return direction
 
 
+class Element(ABC):
+    """A force between bodies that is neither a spring nor that of a mesh.
+
+    ``law`` names the entry of ``FORCE_LAWS`` that has its code.
+    """
+
+    law: ClassVar[str]
+
+    @abstractmethod
+    def largest_stiffness(self, n_dof: int) -> Array:
+        """Stiffness that the steps of an integration must follow, (dof, dof)."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OverAngle:
     """A torque that follows the angle of its own degree of freedom.
@@ -85,6 +103,7 @@ class Equations:
     held : (dof,)        the governor's stiffness is ``held`` times ``held``
     held_damping : s     its damping is so many times its stiffness
     sources : torques over an angle
+    elements : further forces between bodies
     reference : degree of freedom whose rotation is 1
     angles : degrees of freedom whose angles are given out
     """
@@ -99,6 +118,32 @@ class Equations:
     sources: tuple[OverAngle, ...]
     reference: int
     angles: tuple[int, ...]
+    elements: tuple[Element, ...] = ()
+
+    def rates(self, mesh_stiffness: Array) -> NDArray[np.complex128]:
+        """Eigenvalues in 1/s with every mesh held at a stiffness in N/m, (mesh,)."""
+        n, rigid = len(self.mass), np.outer(self.held, self.held)
+        stiffness = self.stiffness + rigid
+        damping = self.damping + self.held_damping * rigid
+        for mesh, held in zip(self.meshes, mesh_stiffness.tolist(), strict=True):
+            along = mesh.push(n)
+            stiffness = stiffness + held * np.outer(along, along)
+        for element in self.elements:
+            stiffness = stiffness + element.largest_stiffness(n)
+        state, per_mass = np.zeros((2 * n, 2 * n)), 1.0 / self.mass[:, None]
+        state[:n, n:] = np.eye(n)
+        state[n:, :n], state[n:, n:] = -stiffness * per_mass, -damping * per_mass
+        return np.linalg.eigvals(state).astype(np.complex128)
+
+    def stiff_rates(self, mesh_stiffness: Array) -> NDArray[np.complex128]:
+        """Eigenvalues that the steps must follow, of meshes of a mean stiffness (mesh,), 1/s."""
+        return self.rates(STIFFER * mesh_stiffness)
+
+    def settling_time(self, mesh_stiffness: Array) -> float:
+        """Time in which the slowest motion that is held falls to 1e-4 (longest 0.45 s), s."""
+        decay = -np.real(self.rates(mesh_stiffness))
+        slowest = float(decay[decay > 1e-3].min(initial=np.inf))
+        return min(LONGEST_SETTLING, math.log(1.0 / SETTLED) / slowest)
 
     def holding(self, deflection: Array) -> Array:
         """Forces that hold a deflection against springs and mean mesh forces, (dof,)."""

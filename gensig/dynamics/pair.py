@@ -15,12 +15,7 @@ from numpy.typing import NDArray
 from gensig.dynamics.equations import PAIR_SLIDE, Equations, Mesh
 from gensig.dynamics.helical import AXIAL_DOFS, axial_reach, pitches
 from gensig.dynamics.mesh_teeth import MeshTeeth
-from gensig.dynamics.system import (
-    LumpedSystem,
-    eigenvalues,
-    settling_time,
-    slowest_decay,
-)
+from gensig.dynamics.system import LumpedSystem
 from gensig.errors import ConfigError
 from gensig.mesh.pair_table import PairTable
 from gensig.mesh.sliced.sliced_table import SlicedTable
@@ -323,15 +318,12 @@ class PairDynamics:
     @cached_property
     def stiff_rates(self) -> NDArray[np.complex128]:
         """Eigenvalues with the mesh held at 1.2 times its mean stiffness, 1/s."""
-        stiffness = 1.2 * self.mean_mesh_stiffness
-        return eigenvalues(self.system(), self.approach_direction(), stiffness)
+        return self.equations.stiff_rates(np.array([self.mean_mesh_stiffness]))
 
     @cached_property
     def settling_time(self) -> float:
         """Time after which the start's transient has fallen to 1e-4 (longest 0.45 s), s."""
-        direction = self.approach_direction()
-        rate = slowest_decay(self.system(), direction, self.mean_mesh_stiffness)
-        return settling_time(rate)
+        return self.equations.settling_time(np.array([self.mean_mesh_stiffness]))
 
     @cached_property
     def equations(self) -> Equations:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +10,6 @@ from numpy.typing import NDArray
 from gensig.errors import SimulationError
 
 Array = NDArray[np.float64]
-
-LONGEST_SETTLING = 0.45  # s
-SETTLED = 1e-4  # share of the start's transient that is left
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,39 +42,6 @@ class LumpedSystem:
                 raise SimulationError(
                     f"the {name} matrix would feed energy in; check the signs of the supports"
                 )
-
-
-def eigenvalues(
-    system: LumpedSystem, direction: Array, mesh_stiffness: float
-) -> NDArray[np.complex128]:
-    """Eigenvalues in 1/s of the system with its mesh held at one stiffness.
-
-    ``direction`` (dof,) is the gradient of the approach.
-    """
-    n, mesh = len(system.mass), np.outer(direction, direction)
-    k = (system.stiffness + mesh_stiffness * mesh) / system.mass[:, None]
-    c = system.damping / system.mass[:, None]
-    state = np.zeros((2 * n, 2 * n))
-    state[:n, n:] = np.eye(n)
-    state[n:, :n], state[n:, n:] = -k, -c
-    return np.linalg.eigvals(state).astype(np.complex128)
-
-
-def slowest_decay(
-    system: LumpedSystem, direction: Array, mesh_stiffness: float
-) -> float:
-    """Slowest decay rate in 1/s of the system with its mesh held at a mean stiffness.
-
-    ``direction`` (dof,) is the gradient of the approach. Rigid-body motion without restoring
-    force is left out.
-    """
-    rates = -np.real(eigenvalues(system, direction, mesh_stiffness))
-    return float(rates[rates > 1e-3].min(initial=np.inf))
-
-
-def settling_time(slowest: float) -> float:
-    """Time in which motion of the slowest decay rate in 1/s falls to 1e-4 (longest 0.45 s), s."""
-    return min(LONGEST_SETTLING, math.log(1.0 / SETTLED) / slowest)
 
 
 def stiffest_motion(

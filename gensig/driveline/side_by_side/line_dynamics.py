@@ -18,13 +18,10 @@ from gensig.dynamics.backends.nystroem.stability import stable_rate
 from gensig.dynamics.equations import A_TURN, NONE, Equations, Mesh, OverAngle
 from gensig.dynamics.integrator import Solver
 from gensig.dynamics.mesh_teeth import MeshTeeth
-from gensig.dynamics.system import settling_time
 from gensig.errors import SimulationError, StepError
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-
-STIFFER = 1.2  # than their mean stiffness are meshes taken for the longest step
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -121,28 +118,12 @@ class LineDynamics:
     @cached_property
     def stiff_rates(self) -> NDArray[np.complex128]:
         """Eigenvalues with the meshes held at 1.2 times their mean stiffness, 1/s."""
-        return self._rates(STIFFER)
+        return self.equations.stiff_rates(self.mesh_stiffness)
 
     @cached_property
     def settling_time(self) -> float:
         """Time after which the start's transient has fallen to 1e-4 (longest 0.45 s), s."""
-        rates = -np.real(self._rates(1.0))
-        return settling_time(float(rates[rates > 1e-3].min(initial=np.inf)))
-
-    def _rates(self, stiffer: float) -> NDArray[np.complex128]:
-        line = self.running.line
-        stiffness, n = line.stiffness.copy(), len(line.names)
-        for mesh, held in zip(line.meshes, self.mesh_stiffness, strict=True):
-            along = np.outer(mesh.direction, mesh.direction)
-            stiffness += stiffer * held * along
-        per_mass = 1.0 / np.diag(line.mass)[:, None]
-        state = np.block(
-            [
-                [np.zeros((n, n)), np.eye(n)],
-                [-stiffness * per_mass, -line.damping * per_mass],
-            ]
-        )
-        return np.linalg.eigvals(state).astype(np.complex128)
+        return self.equations.settling_time(self.mesh_stiffness)
 
     @cached_property
     def rest(self) -> Array:

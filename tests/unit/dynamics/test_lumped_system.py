@@ -10,7 +10,8 @@ from lane_tools import BRIEF, laws, motion_of, right_hand_side
 
 from gensig.dynamics._vector import LANES
 from gensig.dynamics.backends.nystroem.machine_lanes import pack
-from gensig.dynamics.system import LumpedSystem, slowest_decay
+from gensig.dynamics.equations import Equations
+from gensig.dynamics.system import LumpedSystem
 from gensig.errors import SimulationError
 
 OSCILLATOR = LumpedSystem(
@@ -70,11 +71,25 @@ def test_impossible_systems_are_refused(changes, text):
         replace(OSCILLATOR, **changes)
 
 
-def test_slowest_decay_of_an_oscillator():
-    assert_close(slowest_decay(OSCILLATOR, np.zeros(2), 0.0), 1.0, 1e-9)
+def test_settling_of_an_oscillator():
+    """The body that is held decays with 30/s; one that turns freely has nothing to settle."""
+    held = Equations(
+        mass=OSCILLATOR.mass,
+        stiffness=1e4 * OSCILLATOR.stiffness,
+        damping=30.0 * OSCILLATOR.damping,
+        rotation=np.zeros(2),
+        held=np.zeros(2),
+        held_damping=0.0,
+        meshes=(),
+        sources=(),
+        reference=1,
+        angles=(1,),
+    )
+    nothing = np.zeros(0)
+    assert_close(held.settling_time(nothing), np.log(1e4) / 30.0, 1e-9)
     zero = np.zeros((2, 2))
-    free = replace(OSCILLATOR, stiffness=zero, damping=zero)
-    assert np.isinf(slowest_decay(free, np.zeros(2), 0.0))
+    free = replace(held, stiffness=zero, damping=zero)
+    assert free.settling_time(nothing) == 0.0
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ from scipy.optimize import brentq
 from gensig.dynamics import mesh_statics
 from gensig.dynamics.lanes import near_positions
 from gensig.dynamics.pair import DOFS, PAIR_DOFS, Rotor
-from gensig.dynamics.system import eigenvalues
 from gensig.errors import ConfigError
 from gensig.operation.courses import Profile
 from gensig.systems.registry import read_system
@@ -203,21 +202,19 @@ class TestTorsion:
         [(MOTOR, "pinion", "motor"), (LOAD, "wheel", "load")],
     )
     def test_two_inertias_on_a_spring(self, whole, rotor, gear, end):
-        system, (drive_k, drive_c) = (
-            whole.system(),
-            drive_matrices(whole),
-        )
+        equations = whole.equations
         names = f"{gear}_rotation", f"{end}_rotation"
-        index = [system.names.index(name) for name in names]
+        index = [whole.dofs.index(name) for name in names]
         block = np.ix_(index, index)
         free = replace(
-            system,
-            names=names,
-            mass=system.mass[index],
-            stiffness=(system.stiffness - drive_k)[block],
-            damping=(system.damping - drive_c)[block],
+            equations,
+            mass=equations.mass[index],
+            stiffness=equations.stiffness[block],
+            damping=equations.damping[block],
+            held=np.zeros(2),
+            meshes=(),
         )
-        rates = eigenvalues(free, np.zeros(2), 0.0)
+        rates = free.rates(np.zeros(0))
         turning = rates[np.imag(rates) > 1.0]
         expected = math.sqrt(rotor.coupling_stiffness * sum(1 / free.mass))
         ratio = -np.real(turning) / np.abs(turning)

@@ -67,7 +67,8 @@ class Group(NamedTuple):
     is no part of them: its stiffness is ``held`` (dof, lane) times ``held``, its damping
     ``held_damping`` (lane,) s times as much, on ``held_dofs``. ``sources`` are the degrees of
     freedom on which torques act that follow their angle: ``source_numbers`` (source, row, lane)
-    say where the nodes of each are in ``source_table``.
+    say where the nodes of each are in ``source_table``. ``elements`` are the arrays of every force
+    law that the machines have beside meshes, as its ``ForceLaw.rows``.
     """
 
     n_meshes: int
@@ -116,6 +117,7 @@ class Group(NamedTuple):
     sources: Any
     source_numbers: Any
     source_table: Any
+    elements: Any
 
 
 class SpurGroup(Group):

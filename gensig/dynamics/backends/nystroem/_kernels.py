@@ -10,6 +10,7 @@ a machine.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import Any
 
 from gensig.dynamics import _layout as layout
@@ -61,6 +62,7 @@ from gensig.dynamics.backends.nystroem._motion import (
     predict,
     to_middle,
 )
+from gensig.dynamics.backends.nystroem.force_law import ForceLaw
 
 RECENTER = 256  # steps between two removals of the drift of the rotations, to keep numbers small
 
@@ -104,20 +106,24 @@ class Law(ABC):
         """Keep what the next call begins with."""
 
 
-def pull(group, time, since, q, v, has_dampers, has_sources, machine, wide):
-    """Add the forces of springs, dampers, governor and sources, ``since`` s after a step's begin.
+def pull(forces, group, time, since, q, v, has_dampers, has_sources, machine, wide):
+    """Add all forces but those of meshes, ``since`` s after a step's begin.
 
-    Those of each degree of freedom alone are there.
+    Those of each degree of freedom alone are there. ``forces`` are the laws of elements.
     """
     couple(group, q, v, machine)
     govern(group, q, v, machine)
     if not is_gear_pair(group):
         when(has_dampers, lambda: call(damp, group, v, machine))
         when(has_sources, lambda: call(drive, group, time, since, q, machine, wide))
+    for elements in group.elements:
+        kind = elements.kind.instance_class
+        law = next(each for each in forces.values() if each.rows is kind)
+        law.push(group, elements, q, v, machine)
 
 
-def integrator(law: Law) -> Any:
-    """The core of machines whose meshes have one law."""
+def integrator(law: Law, forces: Mapping[str, ForceLaw]) -> Any:
+    """The core of machines whose meshes have one law, and whose elements have some of others."""
 
     @traced
     def pull_at_begin(
@@ -134,7 +140,18 @@ def integrator(law: Law) -> Any:
             law.start(group, m, slot, fresh, machine, work, wide, near)
 
         loop(rows_of(group.force, n), alone)
-        pull(group, time, 0.0, rows.Q, rows.V, has_dampers, has_sources, machine, wide)
+        pull(
+            forces,
+            group,
+            time,
+            0.0,
+            rows.Q,
+            rows.V,
+            has_dampers,
+            has_sources,
+            machine,
+            wide,
+        )
         loop(meshes_of(group), push)
 
     @traced
@@ -234,7 +251,18 @@ def integrator(law: Law) -> Any:
             conclude(d, acceleration(group, d, machine), step, machine)
 
         def pull_from(q, v, since):
-            pull(group, time, since, q, v, has_dampers, has_sources, machine, wide)
+            pull(
+                forces,
+                group,
+                time,
+                since,
+                q,
+                v,
+                has_dampers,
+                has_sources,
+                machine,
+                wide,
+            )
 
         loop(n_meshes, read)
         loop(n_dof, go_to_middle)

@@ -25,6 +25,7 @@ from gensig.dynamics.backends.nystroem._group import (
     SpurPairGroup,
 )
 from gensig.dynamics.backends.nystroem._pairs import MISSING_COMPLIANCE, MISSING_GAP
+from gensig.dynamics.backends.nystroem.force_law import ForceLaw, of_law
 from gensig.dynamics.equations import A_TURN, N_MOTIONS, Dynamics, Equations
 from gensig.dynamics.lanes import (
     MeshLanes,
@@ -34,6 +35,7 @@ from gensig.dynamics.lanes import (
     side_by_side,
 )
 from gensig.dynamics.mesh_teeth import MeshTeeth
+from gensig.errors import SimulationError
 from gensig.mesh.pair_table import PairTable
 
 Array = NDArray[np.float64]
@@ -91,13 +93,15 @@ def pack(
     step: float,
     precision: str = "float64",
     span: tuple[float, float] = (0.0, 0.0),
+    forces: Mapping[str, ForceLaw] | None = None,
 ) -> Group:
-    """Machines of the same bodies, meshes and laws as one group.
+    """Machines of the same bodies, meshes, elements and laws as one group.
 
     Parameters
     ----------
     step : s    of integration, over which the paper's law switches a pair
     span : s    begin and end of the required course of speed and torque, where they change
+    forces : laws of elements by name
     """
     lanes = fill_lanes([Lane.of(each) for each in dynamics], precision)
     first = lanes[0].equations
@@ -106,6 +110,7 @@ def pack(
         **_meshes(lanes, step, precision, has_chords=issubclass(kind, ChordGroup)),
         **_bodies(lanes, precision),
         **_sources(lanes, precision),
+        "elements": _elements(lanes, forces or {}, precision),
         "force": side_by_side(profile.steady, precision),
         "profile": profile.values.ravel(),
         "profile_first": profile.first,
@@ -192,6 +197,29 @@ def _mesh_lanes(lanes: Sequence[Lane], m: int) -> MeshLanes:
         for lane, mesh in zip(lanes, meshes, strict=True)
     ]
     return MeshLanes.of([mesh.teeth for mesh in meshes], np.array(turned))
+
+
+def _elements(
+    lanes: Sequence[Lane], forces: Mapping[str, ForceLaw], precision: str
+) -> tuple[Any, ...]:
+    """Arrays of every force law that the machines have beside meshes.
+
+    Raises
+    ------
+    SimulationError    for an element without a law
+    """
+    rests, packed = np.stack([lane.rest for lane in lanes]), []
+    for element in lanes[0].equations.elements:
+        if element.law not in forces:
+            raise SimulationError(
+                f"no force law {element.law!r}; there are: {', '.join(forces) or 'none'}"
+            )
+    for name, law in forces.items():
+        elements = [of_law(lane.equations.elements, name) for lane in lanes]
+        if elements[0]:
+            arrays = law.pack(elements, rests, precision)
+            packed.append(law.rows(*map(aligned, arrays)))
+    return tuple(packed)
 
 
 def missing_cells() -> Array:

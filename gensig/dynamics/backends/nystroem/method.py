@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, final
 
 from gensig.dynamics._record_kernels import recorder
@@ -15,6 +16,7 @@ from gensig.dynamics.backends.nystroem._any_law_meshes import AnyLawMeshes
 from gensig.dynamics.backends.nystroem._group import SpurGroup, scratch
 from gensig.dynamics.backends.nystroem._kernels import Law, integrator
 from gensig.dynamics.backends.nystroem._spur_meshes import SpurMeshes
+from gensig.dynamics.backends.nystroem.force_law import ForceLaw
 from gensig.dynamics.backends.nystroem.machine_lanes import group_kind, pack
 from gensig.dynamics.backends.nystroem.stability import stable_rate
 from gensig.dynamics.backends.step_limits import (
@@ -34,11 +36,17 @@ def coarsest_oversampling(
     return min(oversampling, math.ceil(least))
 
 
+# laws of meshes: closed form of three pairs, and chords of up to eight pairs with the paper's law
+MESH_LAWS: dict[str, Law] = {"three_pairs": SpurMeshes(), "any": AnyLawMeshes()}
+# laws of other elements, by the name that an ``Element`` has
+FORCE_LAWS: dict[str, ForceLaw] = {}
+
+
 def _core(law: Law) -> Core:
     """The core of machines whose meshes have one law."""
-    integrate = integrator(law)
+    integrate = integrator(law, FORCE_LAWS)
     return Core(
-        pack=pack,
+        pack=partial(pack, forces=FORCE_LAWS),
         scratch=scratch,
         integrate=integrate,
         record=recorder(integrate),
@@ -46,7 +54,7 @@ def _core(law: Law) -> Core:
     )
 
 
-THREE_PAIRS, ANY_LAW = _core(SpurMeshes()), _core(AnyLawMeshes())
+THREE_PAIRS, ANY_LAW = map(_core, MESH_LAWS.values())
 
 
 def core_of(kind: type[Any]) -> Core:
