@@ -61,7 +61,7 @@ class GroupRun:
         self.core = core
         self.state = aligned(np.zeros((2, n_dof, self.n_lanes), dtype=precision))
         self.lost = aligned(np.zeros((self.n_meshes, self.n_lanes), dtype=precision))
-        self.fresh = np.ones(self.n_lanes, dtype=precision)
+        self.fresh = aligned(np.ones(self.n_lanes, dtype=precision))
         scratch = core.scratch(self.n_meshes, n_dof, precision)
         self.work, self.wide, self.near = map(aligned, scratch)
 

@@ -1,16 +1,15 @@
-"""The two-evaluation core: independent lanes, calls of any length, refusals, law and steps."""
+"""The two-evaluation core: records, refusals, law of three pairs and steps."""
 
 import itertools
 
 import numpy as np
 import pytest
 from closeness import assert_close
-from core_runs import MISSING, QUICK, CoreRun, assert_independent
+from core_runs import MISSING, QUICK, assert_independent
 from numba import njit
 
 from gensig.dynamics._vector import LANES, get_row, set_row, spread
 from gensig.dynamics.backends.nystroem._law import shared_load
-from gensig.dynamics.backends.nystroem.method import THREE_PAIRS
 from gensig.dynamics.backends.nystroem.stability import (
     amplification,
     stability_limit,
@@ -19,60 +18,8 @@ from gensig.dynamics.integrator import check_machine
 from gensig.errors import SimulationError
 from gensig.systems.run import Run, Start
 
-STEP = 1 / (51200 * 5)
-N_STEPS = 3000
-CUTS = [(1, 2, 997, 2000), (1500, 0, 1500), (255, 1, 1, 254, 1, 1, 1, 254, 2232)]
 SPEED, TORQUE = "operating.speed_rpm", "operating.torque_nm"
-SPEEDS = 1800, 2500, 1300, 900, 3600, 1800, 600, 5000
-TORQUES = 20, 2, 5, 60, 20, 1, 30, 8
 BACKEND = {"solver.backend": "nystroem"}
-
-
-@pytest.fixture(scope="module")
-def machines(machine, dynamics_of):
-    """Eight machines, sound and with a missing tooth, of many speeds and torques."""
-    made = []
-    for k, (speed, torque) in enumerate(zip(SPEEDS, TORQUES, strict=True)):
-        system = machine({SPEED: speed, TORQUE: torque})
-        made.append(dynamics_of(system, MISSING * (k % 2), phase=0.1 * k))
-    return made
-
-
-def motion(machines, pieces):
-    """State, means over the steps, lost steps."""
-    run = CoreRun(machines, STEP, core=THREE_PAIRS)
-    means = [run.means(n_steps) for n_steps in pieces]
-    return run.whole, np.concatenate(means), run.lost
-
-
-@pytest.fixture(scope="module")
-def whole(machines):
-    return motion(machines, (N_STEPS,))
-
-
-class TestCalls:
-    @pytest.mark.parametrize("pieces", CUTS)
-    def test_pieces_make_the_whole(self, machines, whole, pieces):
-        parts = motion(machines, pieces)
-        assert [part.tobytes() for part in parts] == [part.tobytes() for part in whole]
-
-    @pytest.mark.parametrize("lane", [0, 1, 5, 7])
-    def test_a_lane_does_not_see_the_others(self, machines, whole, lane):
-        state, means, lost = motion([machines[lane]], (N_STEPS,))
-        assert state[..., 0].tobytes() == whole[0][..., lane].tobytes()
-        assert means[..., 0].tobytes() == whole[1][..., lane].tobytes()
-        assert lost[0, 0] == whole[2][0, lane]
-
-    def test_a_lane_that_begins_later_is_as_fresh(self, machines, whole):
-        """Another lane restarts, which the first does not see; it moves as from the start."""
-        run = CoreRun(machines, STEP, core=THREE_PAIRS)
-        run.means(700)
-        run.restart(3)
-        restarted = run.means(N_STEPS - 700)
-        assert restarted[:, :, 0].tobytes() == whole[1][700:, :, 0].tobytes()
-
-        late = CoreRun([machines[3]], STEP, core=THREE_PAIRS, first_step=700)
-        assert late.means(500)[..., 0].tobytes() == restarted[:500, :, 3].tobytes()
 
 
 class TestRecords:

@@ -66,6 +66,13 @@ from gensig.dynamics.backends.nystroem._meshes import (
 from gensig.dynamics.backends.nystroem._slots import keep_begin, near_pairs, roll_ahead
 
 
+def _of(group, m, work, wide, near):
+    """A mesh, and its rows in the scratch."""
+    n = width(work)
+    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
+    return mesh, own, wide_rows(wide, m, n), integer_rows(near, m, n)
+
+
 @inlined
 def _look_ahead(mesh, step, approach, rate, work):
     """Set how near pairs are that may touch in the step, and what chords are chosen by."""
@@ -76,19 +83,19 @@ def _look_ahead(mesh, step, approach, rate, work):
         set_row(work, layout.LOCAL, approach + (0.5 * step) * rate - bent)
 
 
-@inlined
-def _read_begin(mesh, slot, fresh, step, approach, rate, work, wide, near):
-    """Read the tables at the begin of the first step of a call; lanes that go on keep chords."""
+@compiled
+def _before_reading(mesh, slot, fresh, step, approach, rate, work, wide, near):
+    """Set where the tables are read at the begin of a call; lanes that go on keep chords."""
     n = width(work)
     for lane in range(n):
         work[at(layout.FLAGS, lane, n)] = fresh[lane]
         if fresh[lane] > 0.0:
+            near[at(layout.NEWEST, lane, n)] = layout.NO_PAIR
             wide[at(ROLL + slot, lane, n)] = wide[at(BASE, lane, n)]
             mean_force = mesh.numbers[at(layout.MEAN_FORCE, lane, n)]
             work[at(layout.LAST_TOTAL, lane, n)] = mean_force
     _look_ahead(mesh, step, approach, rate, work)
     set_row(work, AHEAD + slot, spread(work, 0.0))
-    gather(mesh, slot, True, work, wide, near)
 
 
 @inlined
@@ -132,35 +139,23 @@ def _read_slots(mesh, slot, next_slot, step, approach, rate, work, wide, near):
 
 
 @compiled
-def _begin_mesh(group, m, slot, fresh, step, machine, work, wide, near):
-    """Read the tables of a mesh at the begin of the first step of a call."""
-    n = width(work)
-    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
-    own_wide, counts = wide_rows(wide, m, n), integer_rows(near, m, n)
-    for lane in range(n):
-        if fresh[lane] > 0.0:
-            counts[at(layout.NEWEST, lane, n)] = layout.NO_PAIR
-    approach, rate = motion(group, m, rows.Q, rows.V, machine)
-    _read_begin(mesh, slot, fresh, step, approach, rate, own, own_wide, counts)
-
-
-@compiled
-def _start_mesh(group, m, slot, fresh, machine, work, wide, near):
-    """Push by a mesh at the begin of a step, and set what it remembers where it is fresh."""
-    n = width(work)
-    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
-    own_wide, counts = wide_rows(wide, m, n), integer_rows(near, m, n)
+def _put_aside(slot, fresh, own, own_wide, counts):
+    """Keep what the lanes that are not fresh remember of a mesh, in other rows."""
+    n = width(own)
     for lane in range(n):
         own[at(rows.FRESH, lane, n)] = fresh[lane]
     _set_ahead(slot, own, own_wide)
-    set_begun(group, m, machine, own)
-    # what the other lanes remember waits in other rows
     set_row(own, rows.ANY_EARLY, get_row(own, rows.NORMAL))
     for k in range(layout.MOST_PAIRS):
         set_row(own, rows.ANY_SHORT + k, get_row(own, layout.PAIR_FORCE + k))
     first, last = near_pairs(slot, n, counts)
     _keep_near(first, last, n, counts)
-    _push_mesh(group, m, slot, END_AT, 0.0, rows.Q, rows.V, machine, work, wide, near)
+
+
+@compiled
+def _take_back(mesh, slot, own, counts):
+    """Set what a mesh remembers in the lanes that are fresh, and take back that of the others."""
+    first, last = near_pairs(slot, width(own), counts)
     count_anew(mesh, own, counts)
     _keep_others(rows.NORMAL, rows.ANY_EARLY, own)
     for k in range(layout.MOST_PAIRS):
@@ -264,11 +259,20 @@ class AnyLawMeshes(Law):
 
     def begin(self, group, m, slot, fresh, step, machine, work, wide, near):
         """Read the tables of a mesh at the begin of the first step of a call."""
-        call(_begin_mesh, group, m, slot, fresh, step, machine, work, wide, near)
+        mesh, own, own_wide, counts = _of(group, m, work, wide, near)
+        approach, rate = motion(group, m, rows.Q, rows.V, machine)
+        at_begin = step, approach, rate, own, own_wide, counts
+        call(_before_reading, mesh, slot, fresh, *at_begin)
+        call(gather, mesh, slot, True, own, own_wide, counts)
 
     def start(self, group, m, slot, fresh, machine, work, wide, near):
         """Push by a mesh at the begin of a step, and set what it remembers where it is fresh."""
-        call(_start_mesh, group, m, slot, fresh, machine, work, wide, near)
+        mesh, own, own_wide, counts = _of(group, m, work, wide, near)
+        call(_put_aside, slot, fresh, own, own_wide, counts)
+        set_begun(group, m, machine, own)
+        at_begin = slot, END_AT, 0.0, rows.Q, rows.V
+        call(_push_mesh, group, m, *at_begin, machine, work, wide, near)
+        call(_take_back, mesh, slot, own, counts)
 
     def write(self, group, m, seen, row, work, wide, near):
         """Write the state of the pairs of a mesh at the begin of a step."""
@@ -276,9 +280,7 @@ class AnyLawMeshes(Law):
 
     def read(self, group, m, slot, next_slot, step, machine, work, wide, near):
         """Read the tables of a mesh at the end of the step, and set those in its middle."""
-        n = width(work)
-        mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
-        own_wide, counts = wide_rows(wide, m, n), integer_rows(near, m, n)
+        mesh, own, own_wide, counts = _of(group, m, work, wide, near)
         approach, rate = motion(group, m, rows.Q, rows.V, machine)
         ahead = step * get_row(mesh.numbers, layout.PINION_RADIUS)
         ahead = ahead * mean_speed(group, m, step, machine)
@@ -299,13 +301,13 @@ class AnyLawMeshes(Law):
 
     def push_middle(self, group, m, step, machine, work, wide, near):
         """Evaluate the law of a mesh in the middle of the step and add its forces."""
-        at = MIDDLE, MIDDLE_AT, 0.5 * step, rows.MIDDLE_Q, rows.MIDDLE_V
-        call(_push_mesh, group, m, *at, machine, work, wide, near)
+        instant = MIDDLE, MIDDLE_AT, 0.5 * step, rows.MIDDLE_Q, rows.MIDDLE_V
+        call(_push_mesh, group, m, *instant, machine, work, wide, near)
 
     def push_end(self, group, m, slot, step, machine, work, wide, near):
         """Evaluate the law of a mesh at the end of the step and add its forces."""
-        at = slot, END_AT, step, rows.END_Q, rows.END_V
-        call(_push_mesh, group, m, *at, machine, work, wide, near)
+        instant = slot, END_AT, step, rows.END_Q, rows.END_V
+        call(_push_mesh, group, m, *instant, machine, work, wide, near)
 
     def end(self, group, m, slot, step, machine, work, near):
         """Correct the end of the step for the kinks of a mesh, and shift what it remembers."""

@@ -18,7 +18,6 @@ from gensig.dynamics._layout import EVEN, ODD
 from gensig.dynamics._vector import (
     EIGHT,
     at,
-    compiled,
     get_row,
     inlined,
     load_wide,
@@ -126,9 +125,8 @@ def integrator(law: Law, forces: Mapping[str, ForceLaw]) -> Any:
     """The core of machines whose meshes have one law, and whose elements have some of others."""
 
     @traced
-    def pull_at_begin(
-        group, slot, fresh, time, has_dampers, has_sources, work, wide, near
-    ):
+    def start(group, slot, fresh, time, has_dampers, has_sources, work, wide, near):
+        """Set what the step remembers in the lanes that are fresh, from one evaluation there."""
         n = width(work)
         machine = machine_rows(work, meshes_of(group), n)
 
@@ -153,39 +151,14 @@ def integrator(law: Law, forces: Mapping[str, ForceLaw]) -> Any:
             wide,
         )
         loop(meshes_of(group), push)
+        flags = get_row(fresh, 0)
 
-    @traced
-    def remember(group, machine):
-        """Set what a step remembers to the accelerations at its begin, in the fresh lanes."""
-        flags = get_row(machine, rows.FRESH)
-
-        def accelerations(d):
+        def remember(d):
             a = acceleration(group, d, machine)
             for name in (rows.NOW, rows.HALFWAY, rows.BEFORE):
                 choose(flags, of(name, d), a, machine)
 
-        loop(rows_of(group.force, width(machine)), accelerations)
-
-    @compiled
-    def start(group, slot, fresh, time, work, wide, near):
-        """Set what the step remembers in the lanes that are fresh, from one evaluation there."""
-        n = width(work)
-        has_dampers, has_sources = len(group.damper_other) > 0, len(group.sources) > 0
-        pull_at_begin(
-            group,
-            slot,
-            fresh,
-            time,
-            has_dampers,
-            has_sources,
-            work,
-            wide,
-            near,
-        )
-        machine = machine_rows(work, meshes_of(group), n)
-        for lane in range(n):
-            machine[at(rows.FRESH, lane, n)] = fresh[lane]
-        remember(group, machine)
+        loop(rows_of(group.force, n), remember)
 
     @traced
     def begin_meshes(group, slot, fresh, step, work, wide, near):
@@ -306,24 +279,38 @@ def integrator(law: Law, forces: Mapping[str, ForceLaw]) -> Any:
         n = width(work)
         machine = machine_rows(work, meshes_of(group), n)
         begin(group, step, state, work)
-        starting = is_any_fresh(fresh, n)
         has_dampers, has_sources = len(group.damper_other) > 0, len(group.sources) > 0
         n_channels = len(channels) if out_row >= 0 else 0
         is_changing = len(group.profile) > profile_rows(group, n) * n
         slot, next_slot = EVEN, ODD
+        if n_steps > 0:
+            time = first_step * step
+            if first_step % RECENTER == 0:
+                recenter(group, machine, wide)
+            cell, since = cell_at(group, time, n)
+            set_rolls(group, cell, since, rows.Q, machine, wide)
+            set_forces(group, cell, since, machine, wide)
+            begin_meshes(group, slot, fresh, step, work, wide, near)
+            if is_any_fresh(fresh, n):
+                start(
+                    group,
+                    slot,
+                    fresh,
+                    time,
+                    has_dampers,
+                    has_sources,
+                    work,
+                    wide,
+                    near,
+                )
         for number in range(first_step, first_step + n_steps):
-            time, is_first = number * step, number == first_step
-            is_recentred = number % RECENTER == 0
+            time, is_recentred = number * step, number % RECENTER == 0
             if is_recentred:
                 recenter(group, machine, wide)
             cell, since = cell_at(group, time, n)
             set_rolls(group, cell, since, rows.Q, machine, wide)
-            if is_changing or is_recentred or is_first:
+            if is_changing or is_recentred:
                 set_forces(group, cell, since, machine, wide)
-            if is_first:
-                begin_meshes(group, slot, fresh, step, work, wide, near)
-                if starting:
-                    start(group, slot, fresh, time, work, wide, near)
             if angle_row >= 0 and number % per_angle == 0:
                 write_angles(group, angle, angle_row, machine, wide)
                 if len(seen) > 0:
