@@ -1,6 +1,5 @@
 """Lines of helical meshes, and of many pairs in contact, in the two-evaluation core."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -63,12 +62,6 @@ def line(*words):
     return read_line_machine(read_request([*words]).config)
 
 
-@pytest.fixture(scope="module")
-def helical():
-    """A gearbox of two helical stages with lateral motion."""
-    return line(*HELICAL)
-
-
 @pytest.mark.parametrize("words", [CROWNED, SLANTED], ids=["crowned", "helical"])
 @pytest.mark.parametrize("faults", [(), MISSING], ids=["sound", "missing"])
 def test_a_pair_with_chords_as_a_line_moves_as_the_pair(faults, words):
@@ -79,81 +72,6 @@ def test_a_pair_with_chords_as_a_line_moves_as_the_pair(faults, words):
     pair = pair_dynamics(run)
     assert len(pair.table.depth) > 4
     assert_moves_as_a_line(pair, oversampling=12)  # tilts are stiff
-
-
-def test_two_helical_stages_are_accurate_to_a_thousandth(helical):
-    exact = with_solver(helical, oversampling=40, max_error=None)
-    crack = (one("crack", tooth=4),)
-    runs = [run_of(machine, crack) for machine in (helical, exact)]
-    found, expected = (record.acceleration[None] for record in recorded(*runs))
-    assert 0.0 < in_band_error(found, expected, RATE)[0] < 1e-3
-
-
-@pytest.mark.parametrize("grade", [None, 6], ids=["perfect", "grade 6"])
-def test_two_helical_stages_agree_with_the_implicit_method(grade):
-    """Both methods have one law of the teeth.
-
-    Between the nodes of the tables they differ by up to 1 % of a quiet record, and by a fourth of
-    that with four times the nodes.
-    """
-    words = [*HELICAL, *LOSSLESS, "sensing.channels=[pinion_x, pinion_y, wheel_y]"]
-    if grade is not None:
-        words.append(f"quality.iso1328_grade={grade}")
-    machine = line(*words)
-    specimen = None if grade is None else specimen_of(machine)
-    slow = with_solver(machine, backend="newmark", oversampling=40)
-    smooth = replace(slow, mesh=replace(slow.mesh, friction_coefficient=0.0))
-    runs = [run_of(each, specimen=specimen) for each in (machine, slow, smooth)]
-    records = recorded(*runs)
-    for row in range(len(machine.sensing.channels)):
-        found, expected, other = (
-            spectrum(record.acceleration[row]) for record in records
-        )
-        size = np.linalg.norm(expected)
-        assert np.linalg.norm(found - expected) < 0.01 * size
-        assert np.linalg.norm(other - expected) > 0.02 * size
-
-
-def test_the_loads_of_both_meshes_are_those_of_the_implicit_method():
-    machine = line(*HELICAL, *LOSSLESS)
-    slow = with_solver(machine, backend="newmark", oversampling=40)
-    runs = [run_of(each, with_mesh_state=True) for each in (machine, slow)]
-    ours, theirs = recorded(*runs)
-    meshes = zip(
-        (ours.mesh, *ours.further_meshes),
-        (theirs.mesh, *theirs.further_meshes),
-        strict=True,
-    )
-    for found, expected in meshes:
-        off = np.abs(found.force - expected.force)
-        assert off.max() < 1e-3 * expected.force.mean()
-        assert np.mean(found.pinion_tooth == expected.pinion_tooth) > 0.995
-        assert np.mean(found.wheel_tooth == expected.wheel_tooth) > 0.995
-        assert np.median(np.abs(found.load_share - expected.load_share)) < 1e-3
-        assert np.allclose(found.load_share.sum(axis=0)[~found.contact_lost], 1.0)
-
-
-def test_a_record_does_not_depend_on_its_neighbours(helical):
-    runs = [
-        run_of(helical),
-        run_of(helical, (one("crack", tooth=4),)),
-        run_of(helical, (MissingTooth(gear="wheel", tooth=7),)),
-    ]
-    together = recorded(*runs)
-    for run, record in zip(runs, together, strict=True):
-        (alone,) = recorded(run)
-        assert alone.acceleration.tobytes() == record.acceleration.tobytes()
-    assert together[0].acceleration.tobytes() != together[1].acceleration.tobytes()
-
-
-def test_single_precision_is_nearly_as_accurate(helical):
-    """Of a record this quiet, rounding makes 7e-4."""
-    runs = [
-        run_of(with_solver(helical, precision=precision, max_error=None))
-        for precision in ("float64", "float32")
-    ]
-    double, single = (record.acceleration[None] for record in recorded(*runs))
-    assert in_band_error(single, double, RATE)[0] < 1.2e-3
 
 
 @pytest.mark.parametrize(

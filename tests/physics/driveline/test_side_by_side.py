@@ -44,12 +44,19 @@ TWO_STAGE = (
 )
 
 
-LOSSLESS = (
+HELICAL = (
     *TWO_STAGE,
+    "system=phm09_helical_two_stage",
+    "solver.oversampling=8",
+    "operating.drive_frequency_hz=20",
+)
+NO_LOSS = (
     "system.loss_factor.shaft=0",
     "system.loss_factor.coupling=0",
     "operating.drive_frequency_hz=20",
 )
+LOSSLESS = (*TWO_STAGE, *NO_LOSS)
+BOXES = {"spur": TWO_STAGE, "helical": HELICAL}
 
 
 @pytest.mark.parametrize(
@@ -80,10 +87,16 @@ def two_stage():
     return read_line_machine(read_request(list(TWO_STAGE)).config)
 
 
-def test_two_stages_are_accurate_to_a_thousandth(two_stage):
-    exact = with_solver(two_stage, oversampling=40, max_error=None)
+@pytest.fixture(scope="module", params=BOXES)
+def box(request):
+    """A two-stage gearbox of spur and one of helical gears."""
+    return read_line_machine(read_request(list(BOXES[request.param])).config)
+
+
+def test_two_stages_are_accurate_to_a_thousandth(box):
+    exact = with_solver(box, oversampling=40, max_error=None)
     crack = (one("crack", tooth=4),)
-    runs = [run_of(machine, crack) for machine in (two_stage, exact)]
+    runs = [run_of(machine, crack) for machine in (box, exact)]
     found, expected = (record.acceleration[None] for record in recorded(*runs))
     error = in_band_error(found, expected, RATE)[0]
     assert 0.0 < error < 1e-3
@@ -94,17 +107,25 @@ RAMP = ("operating=ramp",)
 
 
 @pytest.mark.parametrize(
-    ("grade", "more"),
-    [(None, ()), (6, ()), (None, (RIPPLE,)), (None, (RIPPLE, *RAMP))],
-    ids=["perfect", "grade 6", "ripple", "ripple along a ramp"],
+    ("kind", "grade", "more", "limit"),
+    [
+        ("spur", None, (), 3e-3),
+        ("spur", 6, (), 3e-3),
+        ("spur", None, (RIPPLE,), 3e-3),
+        ("spur", None, (RIPPLE, *RAMP), 3e-3),
+        ("helical", None, (), 0.01),
+        ("helical", 6, (), 0.01),
+    ],
 )
-def test_two_stages_agree_with_the_implicit_method(grade, more):
+def test_two_stages_agree_with_the_implicit_method(kind, grade, more, limit):
     """Both methods have one law of the teeth, friction, tilts and torques over an angle included.
 
     They differ in the dampers of the shafts, which have none here, and in where their records
-    begin, which a quick governor forgets.
+    begin, which a quick governor forgets. Between the nodes of helical tables they differ by up to
+    1 % of a quiet record, and by a fourth of that with four times the nodes.
     """
-    words = [*LOSSLESS, *more, "sensing.channels=[pinion_x, pinion_y, wheel_y]"]
+    channels = "sensing.channels=[pinion_x, pinion_y, wheel_y]"
+    words = [*BOXES[kind], *NO_LOSS, *more, channels]
     if grade is not None:
         words.append(f"quality.iso1328_grade={grade}")
     machine = read_line_machine(read_request(words).config)
@@ -120,7 +141,7 @@ def test_two_stages_agree_with_the_implicit_method(grade, more):
             spectrum(record.acceleration[row]) for record in records
         )
         size = np.linalg.norm(expected)
-        assert np.linalg.norm(found - expected) < 3e-3 * size
+        assert np.linalg.norm(found - expected) < limit * size
         assert np.linalg.norm(other - expected) > 0.02 * size
 
 
@@ -184,11 +205,11 @@ def test_an_engine_moves_as_by_the_implicit_method():
     assert np.linalg.norm(found - expected) < 0.1 * np.linalg.norm(expected)
 
 
-def test_a_record_does_not_depend_on_its_neighbours(two_stage):
+def test_a_record_does_not_depend_on_its_neighbours(box):
     runs = [
-        run_of(two_stage),
-        run_of(two_stage, (one("crack", tooth=4),)),
-        run_of(two_stage, (MissingTooth(gear="wheel", tooth=7),)),
+        run_of(box),
+        run_of(box, (one("crack", tooth=4),)),
+        run_of(box, (MissingTooth(gear="wheel", tooth=7),)),
     ]
     together = recorded(*runs)
     for run, record in zip(runs, together, strict=True):
@@ -198,10 +219,15 @@ def test_a_record_does_not_depend_on_its_neighbours(two_stage):
     assert together[0].acceleration.tobytes() != together[1].acceleration.tobytes()
 
 
-def test_single_precision_is_as_accurate(two_stage):
-    runs = [run_of(two_stage), run_of(with_solver(two_stage, precision="float32"))]
-    double, single = (record.acceleration[None] for record in recorded(*runs))
-    assert in_band_error(single, double, RATE)[0] < 1e-3
+def test_single_precision_is_nearly_as_accurate(box):
+    """Of the helical gearbox, which is quiet, rounding makes 7e-4."""
+    machines = (
+        with_solver(box, precision=precision, max_error=None)
+        for precision in ("float64", "float32")
+    )
+    records = recorded(*map(run_of, machines))
+    double, single = (record.acceleration[None] for record in records)
+    assert in_band_error(single, double, RATE)[0] < 1.2e-3
 
 
 def test_the_loads_of_the_teeth_are_known(two_stage):
@@ -242,9 +268,10 @@ def test_the_loads_of_every_mesh_are_known(two_stage):
     assert plain.acceleration.tobytes() == record.acceleration.tobytes()
 
 
-def test_the_loads_are_the_same_by_the_implicit_method():
+@pytest.mark.parametrize(("kind", "limit"), [("spur", 0.01), ("helical", 1e-3)])
+def test_the_loads_are_the_same_by_the_implicit_method(kind, limit):
     """Of both meshes: forces, teeth and their shares."""
-    machine = read_line_machine(read_request([*LOSSLESS]).config)
+    machine = read_line_machine(read_request([*BOXES[kind], *NO_LOSS]).config)
     slow = with_solver(machine, backend="newmark", oversampling=40)
     runs = [run_of(each, with_mesh_state=True) for each in (machine, slow)]
     ours, theirs = recorded(*runs)
@@ -255,7 +282,9 @@ def test_the_loads_are_the_same_by_the_implicit_method():
     )
     for found, expected in meshes:
         off = np.abs(found.force - expected.force)
-        assert off.max() < 0.01 * expected.force.mean()
+        assert off.max() < limit * expected.force.mean()
+        shares = found.load_share.sum(axis=0)[~found.contact_lost]
+        assert np.allclose(shares, 1.0)
         assert np.mean(found.pinion_tooth == expected.pinion_tooth) > 0.995
         assert np.mean(found.wheel_tooth == expected.wheel_tooth) > 0.995
         assert np.median(np.abs(found.load_share - expected.load_share)) < 1e-3

@@ -17,10 +17,9 @@ CUTS = [(1, 2, 497, 1000), (751, 0, 749), (255, 1, 1, 254, 1, 988)]
 SPEED, TORQUE = "operating.speed_rpm", "operating.torque_nm"
 SPEEDS = 1800, 2500, 1300, 900
 TORQUES = 20, 2, 5, 60
-# core and steps per sample; pairs that three follow are also taken by the core of more
+# core and steps per sample
 KINDS = {
     "three": (THREE_PAIRS, 5),
-    "spur": (ANY_LAW, 16),
     "paper": (ANY_LAW, 16),
     "helical": (ANY_LAW, 16),
 }
@@ -72,7 +71,7 @@ def whole(machines):
 
 
 def test_meshes_that_the_core_of_three_pairs_leaves(machines):
-    assert all(is_followed_by_three(each.teeth) for each in machines["spur"])
+    assert all(is_followed_by_three(each.teeth) for each in machines["three"])
     for kind in ("paper", "helical"):
         assert not any(is_followed_by_three(each.teeth) for each in machines[kind])
 
