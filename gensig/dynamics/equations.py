@@ -79,13 +79,15 @@ class Element(ABC):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OverAngle:
-    """A torque that follows the angle of its own degree of freedom.
+    """A torque or a force on a degree of freedom that follows the angle of a shaft.
 
-    ``nodes`` (node,) N m stand at equal distances over a period, straight between them;
-    ``per_rad`` is the number of nodes per rad, and ``shift`` the place in nodes at angle 0.
+    ``nodes`` (node,) N m or N stand at equal distances over a period, straight between them;
+    ``per_rad`` is the number of nodes per rad of the degree of freedom ``turned_by``, and ``shift``
+    the place in nodes at angle 0.
     """
 
     dof: int
+    turned_by: int
     nodes: Array
     per_rad: float
     shift: float
@@ -102,7 +104,7 @@ class Equations:
     rotation : (dof,)    of each with that of the reference, 0 for a translation
     held : (dof,)        the governor's stiffness is ``held`` times ``held``
     held_damping : s     its damping is so many times its stiffness
-    sources : torques over an angle
+    sources : torques and forces over an angle
     elements : further forces between bodies
     reference : degree of freedom whose rotation is 1
     angles : degrees of freedom whose angles are given out

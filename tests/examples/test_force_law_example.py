@@ -1,17 +1,16 @@
 """A force law in two files: ``force_law_example`` and an entry of ``FORCE_LAWS``."""
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
+import changed_pairs
 import numpy as np
 import pytest
+from changed_pairs import Changed
 from force_law_example import Stop, StopLaw
 
-from gensig.dynamics.backends.base import Integration
-from gensig.dynamics.backends.nystroem.method import FORCE_LAWS, Nystroem
+from gensig.dynamics.backends.nystroem.method import FORCE_LAWS
 from gensig.dynamics.decimation import in_band_error
-from gensig.dynamics.equations import Equations
-from gensig.dynamics.pair import PINION_Y, WHEEL_Y, PairDynamics
+from gensig.dynamics.pair import PINION_Y, WHEEL_Y
 from gensig.errors import SimulationError
 
 RATE = 51200.0
@@ -20,32 +19,13 @@ STIFFNESS, PRELOAD = 2e7, 1e-4  # N/m, m
 CHANNELS = ("pinion_x", "pinion_y", "wheel_y", "wheel_rotation")
 
 
-@dataclass(frozen=True, eq=False)
-class Changed:
-    """A gear pair with other equations, and with forces beside its own, (dof,) N."""
-
-    pair: PairDynamics
-    equations: Equations
-    push: np.ndarray
-
-    def __getattr__(self, name):
-        return getattr(self.pair, name)
-
-    @cached_property
-    def stiff_rates(self):
-        return self.equations.stiff_rates(np.array([self.pair.mean_mesh_stiffness]))
-
-    def forces(self, times):
-        return self.pair.forces(times) + self.push
-
-
 def with_stop(pair, clearance):
     """The pair with a stop between both gears along the line of action."""
     stop = Stop(
         first=PINION_Y, second=WHEEL_Y, clearance=clearance, stiffness=STIFFNESS
     )
     equations = replace(pair.equations, elements=(stop,))
-    return Changed(pair, equations, np.zeros(len(pair.dofs)))
+    return Changed(pair, equations)
 
 
 def with_spring(pair):
@@ -57,18 +37,9 @@ def with_spring(pair):
     return Changed(pair, equations, -STIFFNESS * PRELOAD * along)
 
 
-def motion(*machines, oversampling=8):
+def motion(*machines, **options):
     """Accelerations (channel, sample) of machines side by side."""
-    integration = Integration(
-        sampling_rate=RATE,
-        duration=0.02,
-        channels=CHANNELS,
-        with_mesh_state=False,
-        oversampling=oversampling,
-        precision="float64",
-        max_error=None,
-    )
-    return Nystroem().integrate(machines, integration).acceleration
+    return changed_pairs.motion(*machines, channels=CHANNELS, **options)
 
 
 @pytest.fixture(scope="module")

@@ -94,6 +94,7 @@ class LineDynamics:
         per_rad = n_nodes / torque.period
         return OverAngle(
             dof=torque.dof,
+            turned_by=torque.dof,
             nodes=sense * torque.table,
             per_rad=sense * per_rad,
             shift=torque.phase * per_rad,

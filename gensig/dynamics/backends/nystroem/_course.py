@@ -118,9 +118,10 @@ def in_row(exact, row, work):
 
 @compiled
 def drive(group, begin, since, q, machine, wide):
-    """Add the torques that follow an angle to the rows ``ON``, ``since`` s after a step's begin.
+    """Add the torques and forces that follow an angle to the rows ``ON``.
 
-    ``begin`` is the time of it, ``q`` the block of the state at the instant.
+    ``begin`` is the time at the begin of the step, ``since`` the time since then, and ``q`` the
+    block of the state.
     """
     n, n_sources = width(machine), len(group.sources)
     cell, in_cell = cell_at(group, begin + since, n)
@@ -130,9 +131,9 @@ def drive(group, begin, since, q, machine, wide):
         factor = in_row(group.profile, row + 2 * s, machine)
         factor = factor + in_cell * in_row(group.profile, row + 2 * s + 1, machine)
         if any_above(factor * factor, zero):
-            d = number_at(group.sources, s)
-            torque = factor * _over_angle(group, s, d, since, q, machine, wide)
-            pushed = of(rows.ON, d)
+            turned = number_at(group.turned_by, s)
+            torque = factor * _over_angle(group, s, turned, since, q, machine, wide)
+            pushed = of(rows.ON, number_at(group.sources, s))
             set_row(machine, pushed, get_row(machine, pushed) + torque)
 
 

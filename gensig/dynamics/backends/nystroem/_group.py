@@ -65,10 +65,11 @@ class Group(NamedTuple):
     Where there is no spring, ``damper`` (entry, lane) are those of a degree of freedom from its
     ``damper_first`` (dof + 1,) on, with others before it, ``damper_other`` (entry,). The governor
     is no part of them: its stiffness is ``held`` (dof, lane) times ``held``, its damping
-    ``held_damping`` (lane,) s times as much, on ``held_dofs``. ``sources`` are the degrees of
-    freedom on which torques act that follow their angle: ``source_numbers`` (source, row, lane)
-    say where the nodes of each are in ``source_table``. ``elements`` are the arrays of every force
-    law that the machines have beside meshes, as its ``ForceLaw.rows``.
+    ``held_damping`` (lane,) s times as much, on ``held_dofs``. ``sources``
+    are the degrees of freedom on which torques and forces act that follow the angle of those in
+    ``turned_by``: ``source_numbers`` (source, row, lane) say where the nodes of each are in
+    ``source_table``. ``elements`` are the arrays of every force law that the machines have beside
+    meshes, as its ``ForceLaw.rows``.
     """
 
     n_meshes: int
@@ -115,6 +116,7 @@ class Group(NamedTuple):
     reference: int
     angles: Any
     sources: Any
+    turned_by: Any
     source_numbers: Any
     source_table: Any
     elements: Any

@@ -272,14 +272,14 @@ def _is_entry(matrices: Array) -> NDArray[np.bool_]:
 
 def _sources(lanes: Sequence[Lane], precision: str) -> Mapping[str, Any]:
     """Fields of the group that are of torques over an angle."""
-    dofs = [source.dof for source in lanes[0].equations.sources]
-    numbers = np.zeros((len(lanes), len(dofs), groups.N_SOURCE))
+    sources = lanes[0].equations.sources
+    numbers = np.zeros((len(lanes), len(sources), groups.N_SOURCE))
     tables: list[Array] = []
     begin = 0
     for row, lane in zip(numbers, lanes, strict=True):
         for s, source in enumerate(lane.equations.sources):
             n_nodes = len(source.nodes)
-            shift = source.shift + source.per_rad * lane.rest[source.dof]
+            shift = source.shift + source.per_rad * lane.rest[source.turned_by]
             # places are positive: a fraction is then cut off downwards
             shift += groups.PERIODS_BEFORE * n_nodes
             row[s] = source.per_rad, shift, n_nodes, 1.0 / n_nodes, begin
@@ -290,7 +290,8 @@ def _sources(lanes: Sequence[Lane], precision: str) -> Mapping[str, Any]:
             begin += len(tables[-1])
     tables.append(np.zeros(groups.READ_AT_ONCE))
     return {
-        "sources": np.array(dofs, dtype=np.int64),
+        "sources": np.array([each.dof for each in sources], dtype=np.int64),
+        "turned_by": np.array([each.turned_by for each in sources], dtype=np.int64),
         "source_numbers": np.moveaxis(numbers, 0, -1).ravel(),
         "source_table": np.concatenate(tables).astype(precision),
     }

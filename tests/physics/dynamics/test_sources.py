@@ -1,0 +1,59 @@
+"""Forces over the angle of a shaft: an unbalance in the core, beside the linear answer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from changed_pairs import Changed, motion
+
+from gensig.dynamics.equations import OverAngle
+from gensig.dynamics.pair import PINION_ROTATION, PINION_X, PINION_Y
+from gensig.dynamics.response import accelerations
+
+RATE, DURATION = 51200.0, 0.2
+CHANNELS = ("pinion_x", "pinion_y")
+FORCE, N_NODES = 50.0, 512
+# smooth teeth without friction, so that the answer is linear; the drive is quick to settle
+SMOOTH = {
+    "operating.drive_frequency_hz": 20,
+    "operating.duration_s": DURATION,
+    "mesh.friction_coefficient": 0.0,
+}
+
+
+@pytest.fixture(scope="module")
+def pair(machine, dynamics_of):
+    return dynamics_of(machine(SMOOTH))
+
+
+def unbalanced(pair):
+    """The pair with a force that turns with the pinion, from x to y against its rotation."""
+    angle = 2.0 * np.pi * np.arange(N_NODES) / N_NODES
+    sources = tuple(
+        OverAngle(
+            dof=dof,
+            turned_by=PINION_ROTATION,
+            nodes=FORCE * wave(angle),
+            per_rad=N_NODES / (2.0 * np.pi),
+            shift=0.0,
+        )
+        for dof, wave in ((PINION_X, np.cos), (PINION_Y, np.sin))
+    )
+    equations = replace(pair.equations, sources=sources)
+    assert not equations.is_gear_pair
+    return Changed(pair, equations)
+
+
+def test_an_unbalance_moves_the_gears_as_the_linear_machine(pair):
+    """At the order 1 of its shaft, in size and phase."""
+    record = {"channels": CHANNELS, "duration": DURATION, "oversampling": 5}
+    plain, turned = (motion(each, **record)[0] for each in (pair, unbalanced(pair)))
+    speed, n_samples = pair.operating.speed, plain.shape[1]
+    turning = np.exp(-1j * speed * np.arange(n_samples) / RATE)
+    found = 2.0 * np.mean((turned - plain) * turning, axis=1)
+
+    force = np.zeros((1, len(pair.dofs)), dtype=np.complex128)
+    force[0, [PINION_X, PINION_Y]] = FORCE, -1j * FORCE
+    answer = accelerations(pair, np.array([speed]), force)[0]
+    expected = answer[[PINION_X, PINION_Y]]
+    assert np.abs(found - expected).max() < 0.02 * np.abs(expected).max()
