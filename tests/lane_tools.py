@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from benchmarks import _classical_scheme
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._vector import LANES
+from gensig.dynamics.backends.base import Integration
 from gensig.dynamics.backends.nystroem.machine_lanes import pack
+from gensig.dynamics.backends.nystroem.method import Nystroem
+from gensig.dynamics.equations import Equations
 from gensig.dynamics.pair import Body, PairDynamics, Support
 
 LAW = layout.Law._fields
@@ -152,3 +156,39 @@ def right_hand_side(dynamics, time, q, v):
         for step in (BRIEF, 2 * BRIEF)
     )
     return 2 * short - long
+
+
+@dataclass(frozen=True, eq=False)
+class Changed:
+    """A gear pair with other equations, and with a force ``push`` N beside its own, (dof,)."""
+
+    pair: PairDynamics
+    equations: Equations
+    push: np.ndarray | float = 0.0
+
+    def __getattr__(self, name):
+        return getattr(self.pair, name)
+
+    @cached_property
+    def stiff_rates(self):
+        return self.equations.stiff_rates(np.array([self.pair.mean_mesh_stiffness]))
+
+    def forces(self, times):
+        return self.pair.forces(times) + self.push
+
+    def factors(self, times):
+        return np.ones((len(times), len(self.equations.sources)))
+
+
+def motions(*machines, channels, duration=0.02, oversampling=8):
+    """Accelerations (channel, sample) of machines side by side, in float64 at 51.2 kHz."""
+    integration = Integration(
+        sampling_rate=51200.0,
+        duration=duration,
+        channels=channels,
+        with_mesh_state=False,
+        oversampling=oversampling,
+        precision="float64",
+        max_error=None,
+    )
+    return Nystroem().integrate(machines, integration).acceleration

@@ -5,6 +5,9 @@ written function is run as Python instead, with a ``Value`` for what is not know
 operation writes its instruction. Its loops and branches are those of Python, over what is known;
 ``loop``, ``when`` and ``either`` write those of the compiled code, whose bodies are run once. It
 can call other written functions and intrinsics, and ``call`` those that Numba compiles.
+
+Where nothing is unknown, on arrays of NumPy, the same functions calculate, by what ``PLAIN`` has
+for the intrinsics: the tests run the whole step so.
 """
 
 from __future__ import annotations
@@ -35,6 +38,10 @@ def _on_numbers(operation: Callable[..., Any], kind, instruction: str) -> None:
 for _operation in (operator.add, operator.sub, operator.mul):
     _on_numbers(_operation, types.intp, _operation.__name__)
     _on_numbers(_operation, types.float64, f"f{_operation.__name__}")
+
+
+# calculations of intrinsics on known values, by name: ``tests/unit/dynamics/test_plain_target.py``
+PLAIN: dict[str, Callable[..., Any]] = {}
 
 
 class Code:
@@ -134,8 +141,31 @@ class Intrinsic(_Base):  # type: ignore[misc]
         self._register()
 
     def __call__(self, *arguments):
-        code = next(each.code for each in arguments if isinstance(each, Value))
-        return code.write(self._defn, arguments)
+        for each in arguments:
+            if isinstance(each, Value):
+                return each.code.write(self._defn, arguments)
+        return PLAIN[self._name](*arguments)
+
+
+class TypeTest(Intrinsic):
+    """True for named tuples of a type; a constant of the compiled code."""
+
+    def __init__(self, kind: type) -> None:
+        def is_of_kind(typing_context, value):
+            answer = issubclass(value.instance_class, kind)
+
+            def build(context, builder, sig, args):
+                return context.get_constant(types.boolean, answer)
+
+            return types.boolean(value), build
+
+        super().__init__(is_of_kind)
+        self._kind = kind
+
+    def __call__(self, *arguments):
+        if isinstance(arguments[0], Value):
+            return super().__call__(*arguments)
+        return isinstance(arguments[0], self._kind)
 
 
 class Written(Intrinsic):
@@ -205,22 +235,9 @@ class Traced(Intrinsic):
 intrinsic: Any = Intrinsic
 
 
-def type_test(kind: type) -> Any:
-    """An intrinsic that is True for named tuples of a type; a constant of the compiled code."""
-
-    def is_of_kind(typing_context: Any, value: Any) -> Any:
-        answer = issubclass(value.instance_class, kind)
-
-        def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            return context.get_constant(types.boolean, answer)
-
-        return types.boolean(value), build
-
-    return Intrinsic(is_of_kind)
-
-
 written: Any = Written
 traced: Any = Traced
+type_test: Any = TypeTest
 
 
 _open: list[Code] = []  # to which functions that are run write, the innermost last
@@ -241,8 +258,9 @@ def loop(count: Any, body: Callable[[Any], None]) -> None:
     ``count`` is an integer. Values that the body makes must not be used after it, nor can it change
     any: sums live in rows. A count of 1 that is known needs no loop.
     """
-    if isinstance(count, int) and count == 1:
-        body(0)
+    if not _open or (isinstance(count, int) and count == 1):
+        for place in range(count):
+            body(place)
         return
     code = _open[-1]
     _, llvm = code.typed(count)
@@ -250,24 +268,32 @@ def loop(count: Any, body: Callable[[Any], None]) -> None:
         body(Value(code, types.intp, place.index))
 
 
-def any_of(*conditions: Value) -> Value:
+def any_of(*conditions: Any) -> Any:
     """True where any of some conditions holds."""
+    if not _open:
+        return any(conditions)
     code, total = _open[-1], conditions[0].llvm
     for condition in conditions[1:]:
         total = code.builder.or_(total, condition.llvm)
     return Value(code, types.boolean, total)
 
 
-def when(condition: Value, body: Callable[[], None]) -> None:
+def when(condition: Any, body: Callable[[], None]) -> None:
     """Write a branch that is seldom taken; values that it makes must not be used after it."""
+    if not _open:
+        if condition:
+            body()
+        return
     with _open[-1].builder.if_then(condition.llvm, likely=False):
         body()
 
 
 def either(
-    condition: Value, body: Callable[[], Sequence[Any]], values: Sequence[Any]
+    condition: Any, body: Callable[[], Sequence[Any]], values: Sequence[Any]
 ) -> list[Any]:
     """Values that a branch gives where it is taken, which is seldom, else those that are given."""
+    if not _open:
+        return list(body() if condition else values)
     code = _open[-1]
     before, given = code.builder.block, [code.typed(value) for value in values]
     with code.builder.if_then(condition.llvm, likely=False):
@@ -284,6 +310,9 @@ def either(
 
 def call(function: Any, *values: Any) -> None:
     """Write a call of a function that Numba compiles; its result is dropped."""
+    if not _open:
+        function(*values)
+        return
     code = _open[-1]
     if not code.is_kept:
         return

@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
-import changed_pairs
+import lane_tools
 import numpy as np
 import pytest
-from changed_pairs import Changed
 from force_law_example import Stop, StopLaw
+from lane_tools import Changed
 
 from gensig.dynamics.backends.nystroem.method import FORCE_LAWS
 from gensig.dynamics.decimation import in_band_error
@@ -39,7 +39,7 @@ def with_spring(pair):
 
 def motion(*machines, **options):
     """Accelerations (channel, sample) of machines side by side."""
-    return changed_pairs.motion(*machines, channels=CHANNELS, **options)
+    return lane_tools.motions(*machines, channels=CHANNELS, **options)
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from changed_pairs import Changed, motion
+from lane_tools import Changed, motions
 
 from gensig.dynamics.equations import OverAngle
 from gensig.dynamics.pair import PINION_ROTATION, PINION_X, PINION_Y
@@ -47,7 +47,7 @@ def unbalanced(pair):
 def test_an_unbalance_moves_the_gears_as_the_linear_machine(pair):
     """At the order 1 of its shaft, in size and phase."""
     record = {"channels": CHANNELS, "duration": DURATION, "oversampling": 5}
-    plain, turned = (motion(each, **record)[0] for each in (pair, unbalanced(pair)))
+    plain, turned = (motions(each, **record)[0] for each in (pair, unbalanced(pair)))
     speed, n_samples = pair.operating.speed, plain.shape[1]
     turning = np.exp(-1j * speed * np.arange(n_samples) / RATE)
     found = 2.0 * np.mean((turned - plain) * turning, axis=1)

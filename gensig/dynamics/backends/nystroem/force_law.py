@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 class ForceLaw(ABC):
     """Forces of the elements of one kind."""
 
-    rows: ClassVar[type[NamedTuple]]  # arrays of all elements, for all lanes
+    rows: ClassVar[Any]  # type of a named tuple: arrays of all elements, for all lanes
 
     @abstractmethod
     def pack(
