@@ -45,12 +45,6 @@ from gensig.dynamics.backends.nystroem._any_law_kinks import (
     missed_law,
 )
 from gensig.dynamics.backends.nystroem._chord_kinks import miss_chords, read_again
-from gensig.dynamics.backends.nystroem._group import (
-    integer_rows,
-    mesh_of,
-    mesh_rows,
-    wide_rows,
-)
 from gensig.dynamics.backends.nystroem._kernels import Law
 from gensig.dynamics.backends.nystroem._layout import END_AT, MIDDLE_AT
 from gensig.dynamics.backends.nystroem._meshes import (
@@ -64,13 +58,6 @@ from gensig.dynamics.backends.nystroem._meshes import (
     turning_speed,
 )
 from gensig.dynamics.backends.nystroem._slots import keep_begin, near_pairs, roll_ahead
-
-
-def _of(group, m, work, wide, near):
-    """A mesh, and its rows in the scratch."""
-    n = width(work)
-    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
-    return mesh, own, wide_rows(wide, m, n), integer_rows(near, m, n)
 
 
 @inlined
@@ -166,9 +153,8 @@ def _take_back(mesh, slot, own, counts):
 
 
 @compiled
-def _write_mesh(group, m, seen, row, work, wide, near):
+def _write_mesh(own, counts, seen, row):
     """Write the state of the pairs of a mesh at the begin of a step."""
-    own, counts = mesh_rows(work, m, width(work)), integer_rows(near, m, width(work))
     _slots.write_mesh(seen, row, get_row(own, rows.NORMAL), own, counts)
 
 
@@ -180,18 +166,18 @@ def _keep_others(row, kept, own):
 
 
 @compiled
-def _push_mesh(group, m, slot, instant, since, q, v, machine, work, wide, near):
+def _push_mesh(
+    group, m, mesh, machine, own, own_wide, counts, slot, instant, since, q, v
+):
     """Evaluate the law of a mesh ``since`` s after the begin of the step and add its forces.
 
     The state is in the blocks ``q`` and ``v``. Forces and margins at the instant are kept.
     """
-    n = width(work)
-    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
-    first, last = near_pairs(PART, n, integer_rows(near, m, n))
+    first, last = near_pairs(PART, width(own), counts)
     for k in range(layout.MOST_PAIRS):
-        set_row(own, layout.PAIR_FORCE + k, spread(work, 0.0))
+        set_row(own, layout.PAIR_FORCE + k, spread(own, 0.0))
     approach, rate = motion(group, m, q, v, machine)
-    speed = turning_speed(group, m, v, spread(work, since), machine)
+    speed = turning_speed(group, m, v, spread(own, since), machine)
     law = mesh_law(
         mesh,
         first,
@@ -203,7 +189,7 @@ def _push_mesh(group, m, slot, instant, since, q, v, machine, work, wide, near):
         rate,
         get_row(mesh.numbers, layout.PINION_RADIUS) * speed,
         own,
-        wide_rows(wide, m, n),
+        own_wide,
     )
     if instant == MIDDLE_AT:
         keep_margins(mesh, MIDDLE_AT, first, last, slot, own)
@@ -214,11 +200,9 @@ def _push_mesh(group, m, slot, instant, since, q, v, machine, work, wide, near):
 
 
 @compiled
-def _end_mesh(group, m, slot, step, machine, work, near):
+def _end_mesh(group, m, mesh, machine, own, own_wide, counts, slot, step):
     """Correct the end of the step for the kinks of a mesh, and shift what it remembers."""
-    n = width(work)
-    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
-    counts, zero = integer_rows(near, m, n), spread(work, 0.0)
+    n, zero = width(own), spread(own, 0.0)
     first, last = near_pairs(PART, n, counts)
     changed = zero
     for k in range(first, last):
@@ -245,74 +229,51 @@ def _correct(group, mesh, m, step, first, last, machine, own):
     correct_by(group, m, short, early, step, changed, machine)
 
 
-@compiled
-def _keep_mesh(m, work, wide, near):
-    """Keep the slot of the next step's begin where a call begins."""
-    n = width(work)
-    own, own_wide = mesh_rows(work, m, n), wide_rows(wide, m, n)
-    keep_begin(own, own_wide, integer_rows(near, m, n))
-
-
 @final
 class AnyLawMeshes(Law):
     """Meshes with chords, with up to eight pairs of teeth in contact, or of the paper's law."""
 
-    def begin(self, group, m, slot, fresh, step, machine, work, wide, near):
+    def begin(self, s, slot, fresh, step):
         """Read the tables of a mesh at the begin of the first step of a call."""
-        mesh, own, own_wide, counts = _of(group, m, work, wide, near)
-        approach, rate = motion(group, m, rows.Q, rows.V, machine)
-        at_begin = step, approach, rate, own, own_wide, counts
-        call(_before_reading, mesh, slot, fresh, *at_begin)
-        call(gather, mesh, slot, True, own, own_wide, counts)
+        state = motion(s.group, s.m, rows.Q, rows.V, s.machine)
+        own = s.own, s.wide, s.near
+        call(_before_reading, s.mesh, slot, fresh, step, *state, *own)
+        call(gather, s.mesh, slot, True, *own)
 
-    def start(self, group, m, slot, fresh, machine, work, wide, near):
+    def start(self, s, slot, fresh):
         """Push by a mesh at the begin of a step, and set what it remembers where it is fresh."""
-        mesh, own, own_wide, counts = _of(group, m, work, wide, near)
-        call(_put_aside, slot, fresh, own, own_wide, counts)
-        set_begun(group, m, machine, own)
-        at_begin = slot, END_AT, 0.0, rows.Q, rows.V
-        call(_push_mesh, group, m, *at_begin, machine, work, wide, near)
-        call(_take_back, mesh, slot, own, counts)
+        call(_put_aside, slot, fresh, s.own, s.wide, s.near)
+        set_begun(s.group, s.m, s.machine, s.own)
+        s.call(_push_mesh, slot, END_AT, 0.0, rows.Q, rows.V)
+        call(_take_back, s.mesh, slot, s.own, s.near)
 
-    def write(self, group, m, seen, row, work, wide, near):
+    def write(self, s, seen, row):
         """Write the state of the pairs of a mesh at the begin of a step."""
-        call(_write_mesh, group, m, seen, row, work, wide, near)
+        call(_write_mesh, s.own, s.near, seen, row)
 
-    def read(self, group, m, slot, next_slot, step, machine, work, wide, near):
+    def read(self, s, slot, next_slot, step):
         """Read the tables of a mesh at the end of the step, and set those in its middle."""
-        mesh, own, own_wide, counts = _of(group, m, work, wide, near)
-        approach, rate = motion(group, m, rows.Q, rows.V, machine)
-        ahead = step * get_row(mesh.numbers, layout.PINION_RADIUS)
-        ahead = ahead * mean_speed(group, m, step, machine)
-        set_row(own, AHEAD + next_slot, ahead)
-        call(
-            _read_slots,
-            mesh,
-            slot,
-            next_slot,
-            step,
-            approach,
-            rate,
-            own,
-            own_wide,
-            counts,
-        )
-        set_begun(group, m, machine, own)
+        state = motion(s.group, s.m, rows.Q, rows.V, s.machine)
+        ahead = step * get_row(s.mesh.numbers, layout.PINION_RADIUS)
+        ahead = ahead * mean_speed(s.group, s.m, step, s.machine)
+        set_row(s.own, AHEAD + next_slot, ahead)
+        own = s.own, s.wide, s.near
+        call(_read_slots, s.mesh, slot, next_slot, step, *state, *own)
+        set_begun(s.group, s.m, s.machine, s.own)
 
-    def push_middle(self, group, m, step, machine, work, wide, near):
+    def push_middle(self, s, step):
         """Evaluate the law of a mesh in the middle of the step and add its forces."""
-        instant = MIDDLE, MIDDLE_AT, 0.5 * step, rows.MIDDLE_Q, rows.MIDDLE_V
-        call(_push_mesh, group, m, *instant, machine, work, wide, near)
+        state = rows.MIDDLE_Q, rows.MIDDLE_V
+        s.call(_push_mesh, MIDDLE, MIDDLE_AT, 0.5 * step, *state)
 
-    def push_end(self, group, m, slot, step, machine, work, wide, near):
+    def push_end(self, s, slot, step):
         """Evaluate the law of a mesh at the end of the step and add its forces."""
-        instant = slot, END_AT, step, rows.END_Q, rows.END_V
-        call(_push_mesh, group, m, *instant, machine, work, wide, near)
+        s.call(_push_mesh, slot, END_AT, step, rows.END_Q, rows.END_V)
 
-    def end(self, group, m, slot, step, machine, work, near):
+    def end(self, s, slot, step):
         """Correct the end of the step for the kinks of a mesh, and shift what it remembers."""
-        call(_end_mesh, group, m, slot, step, machine, work, near)
+        s.call(_end_mesh, slot, step)
 
-    def keep(self, m, work, wide, near):
+    def keep(self, s):
         """Keep the slot of the next step's begin where a call begins."""
-        call(_keep_mesh, m, work, wide, near)
+        call(keep_begin, s.own, s.wide, s.near)

@@ -6,14 +6,15 @@ degree of freedom. Rows of the drive are those of the last mesh.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._layout import COLUMNS, Helical, is_helical
-from gensig.dynamics._vector import n_lanes
-from gensig.dynamics._written import type_test, written
+from gensig.dynamics._vector import n_lanes, width
+from gensig.dynamics._written import call, type_test, written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._flat import tail
 from gensig.dynamics.equations import N_IN_PLANE, N_MOTIONS
@@ -254,6 +255,46 @@ def integer_rows(near, m, n):
 def machine_rows(work, n_meshes, n):
     """Rows of the machine: ``N_FIXED`` of its last mesh, and its blocks; a view."""
     return tail(work, (n_meshes - 1) * (rows.N_FIXED * n))
+
+
+@dataclass(frozen=True, slots=True)
+class Station:
+    """A mesh of a group in the scratch, for functions that are written into compiled code.
+
+    Parameters
+    ----------
+    m : number of the mesh
+    mesh : its fields
+    machine : rows of the machine
+    own, wide, near : rows, float64 rows and integer rows of the mesh
+    """
+
+    group: Any
+    m: Any
+    mesh: Any
+    machine: Any
+    own: Any
+    wide: Any
+    near: Any
+
+    @classmethod
+    def of(cls, group: Any, m: Any, work: Any, wide: Any, near: Any) -> Station:
+        """The station of a mesh in the scratch of a group."""
+        n = width(work)
+        return cls(
+            group,
+            m,
+            mesh_of(group, m, n),
+            machine_rows(work, meshes_of(group), n),
+            mesh_rows(work, m, n),
+            wide_rows(wide, m, n),
+            integer_rows(near, m, n),
+        )
+
+    def call(self, function: Any, *values: Any) -> None:
+        """Write a call of a compiled function with all parts of the station and other values."""
+        rows_of_mesh = self.machine, self.own, self.wide, self.near
+        call(function, self.group, self.m, self.mesh, *rows_of_mesh, *values)
 
 
 def scratch(n_meshes, n_dof, precision):

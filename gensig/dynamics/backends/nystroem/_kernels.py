@@ -39,6 +39,7 @@ from gensig.dynamics.backends.nystroem._course import (
 )
 from gensig.dynamics.backends.nystroem._flat import number_at, rows_of
 from gensig.dynamics.backends.nystroem._group import (
+    Station,
     is_gear_pair,
     machine_rows,
     mesh_of,
@@ -67,41 +68,38 @@ RECENTER = 256  # steps between two removals of the drift of the rotations, to k
 
 
 class Law(ABC):
-    """Forces of meshes, as code that is written into the step for one mesh ``m``.
-
-    ``work``, ``wide`` and ``near`` are the scratch, ``machine`` the rows of the machine in it.
-    """
+    """Forces of meshes, as code that is written into the step for a mesh in its ``Station``."""
 
     @abstractmethod
-    def begin(self, group, m, slot, fresh, step, machine, work, wide, near):
+    def begin(self, s, slot, fresh, step):
         """Write what a mesh reads at the begin of a call."""
 
     @abstractmethod
-    def start(self, group, m, slot, fresh, machine, work, wide, near):
+    def start(self, s, slot, fresh):
         """Push by a mesh at the begin of a step, and set what it remembers where it is fresh."""
 
     @abstractmethod
-    def write(self, group, m, seen, row, work, wide, near):
+    def write(self, s, seen, row):
         """Write the state of the pairs of a mesh at the begin of a step."""
 
     @abstractmethod
-    def read(self, group, m, slot, next_slot, step, machine, work, wide, near):
+    def read(self, s, slot, next_slot, step):
         """Read what a mesh has where the step will end."""
 
     @abstractmethod
-    def push_middle(self, group, m, step, machine, work, wide, near):
+    def push_middle(self, s, step):
         """Add the forces of a mesh in the middle of the step."""
 
     @abstractmethod
-    def push_end(self, group, m, slot, step, machine, work, wide, near):
+    def push_end(self, s, slot, step):
         """Add the forces of a mesh at the end of the step."""
 
     @abstractmethod
-    def end(self, group, m, slot, step, machine, work, near):
+    def end(self, s, slot, step):
         """Correct the end of the step for what the rule misses, and shift what a mesh remembers."""
 
     @abstractmethod
-    def keep(self, m, work, wide, near):
+    def keep(self, s):
         """Keep what the next call begins with."""
 
 
@@ -135,7 +133,7 @@ def integrator(law: Law, forces: Mapping[str, ForceLaw]) -> Any:
             own_pull(group, d, moved, rate, machine)
 
         def push(m):
-            law.start(group, m, slot, fresh, machine, work, wide, near)
+            law.start(Station.of(group, m, work, wide, near), slot, fresh)
 
         loop(rows_of(group.force, n), alone)
         pull(
@@ -162,24 +160,27 @@ def integrator(law: Law, forces: Mapping[str, ForceLaw]) -> Any:
 
     @traced
     def begin_meshes(group, slot, fresh, step, work, wide, near):
-        machine = machine_rows(work, meshes_of(group), width(work))
-
         def begin_mesh(m):
-            law.begin(group, m, slot, fresh, step, machine, work, wide, near)
+            law.begin(Station.of(group, m, work, wide, near), slot, fresh, step)
 
         loop(meshes_of(group), begin_mesh)
 
     @traced
     def write_meshes(group, seen, row, work, wide, near):
         n_meshes = meshes_of(group)
-        loop(
-            n_meshes,
-            lambda m: law.write(group, m, seen, row * n_meshes + m, work, wide, near),
-        )
+
+        def write_mesh(m):
+            mesh = Station.of(group, m, work, wide, near)
+            law.write(mesh, seen, row * n_meshes + m)
+
+        loop(n_meshes, write_mesh)
 
     @traced
     def keep_meshes(group, work, wide, near):
-        loop(meshes_of(group), lambda m: law.keep(m, work, wide, near))
+        def keep_mesh(m):
+            law.keep(Station.of(group, m, work, wide, near))
+
+        loop(meshes_of(group), keep_mesh)
 
     @traced
     def advance(
@@ -203,22 +204,25 @@ def integrator(law: Law, forces: Mapping[str, ForceLaw]) -> Any:
         n, n_meshes = width(work), meshes_of(group)
         n_dof, machine = rows_of(group.force, n), machine_rows(work, n_meshes, n)
 
+        def station(m):
+            return Station.of(group, m, work, wide, near)
+
         def read(m):
             count_lost(lost, m, mesh_rows(work, m, n))
-            law.read(group, m, slot, next_slot, step, machine, work, wide, near)
+            law.read(station(m), slot, next_slot, step)
 
         def go_to_middle(d):
             own_pull(group, d, *to_middle(d, step, machine), machine)
 
         def push_middle(m):
-            law.push_middle(group, m, step, machine, work, wide, near)
+            law.push_middle(station(m), step)
 
         def go_to_end(d):
             a = acceleration(group, d, machine)
             own_pull(group, d, *predict(d, a, step, machine), machine)
 
         def push_end(m):
-            law.push_end(group, m, next_slot, step, machine, work, wide, near)
+            law.push_end(station(m), next_slot, step)
 
         def finish(d):
             conclude(d, acceleration(group, d, machine), step, machine)
@@ -245,10 +249,7 @@ def integrator(law: Law, forces: Mapping[str, ForceLaw]) -> Any:
         pull_from(rows.END_Q, rows.END_V, step)
         loop(n_meshes, push_end)
         loop(n_dof, finish)
-        loop(
-            n_meshes,
-            lambda m: law.end(group, m, next_slot, step, machine, work, near),
-        )
+        loop(n_meshes, lambda m: law.end(station(m), next_slot, step))
         write_means(group, channels, n_channels, out, out_first, machine)
 
     @inlined

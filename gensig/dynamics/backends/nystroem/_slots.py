@@ -13,7 +13,7 @@ from gensig.dynamics._layout import (
     pair_rows,
     span_index,
 )
-from gensig.dynamics._vector import at, get_row, inlined, set_row, width
+from gensig.dynamics._vector import at, compiled, get_row, inlined, set_row, width
 
 
 @inlined
@@ -32,7 +32,7 @@ def near_pairs(slot, n, near):
     return near[span + layout.FIRST_NEAR_PAIR], near[span + layout.LAST_NEAR_PAIR]
 
 
-@inlined
+@compiled
 def keep_begin(work, wide, near):
     """Copy the slot of the next step's begin from ``ODD`` to ``EVEN``, where a call begins."""
     n = width(work)

@@ -18,11 +18,6 @@ from gensig.dynamics._vector import (
 )
 from gensig.dynamics._written import call, loop, when
 from gensig.dynamics.backends.nystroem import _layout as rows
-from gensig.dynamics.backends.nystroem._group import (
-    mesh_of,
-    mesh_rows,
-    wide_rows,
-)
 from gensig.dynamics.backends.nystroem._kernels import Law
 from gensig.dynamics.backends.nystroem._kinks import kinked, miss, missed_law
 from gensig.dynamics.backends.nystroem._law import mesh_law
@@ -46,33 +41,19 @@ from gensig.dynamics.backends.nystroem._pairs import (
 )
 
 
-def _law_at(group, m, nodes, instant, off, turned, since, q, v, machine, work, wide):
+def _law_at(s, nodes, instant, off, turned, since, q, v):
     """Law of a mesh at a state, ``off`` m after its nodes and ``turned`` m after the begin."""
-    n = width(work)
-    mesh = mesh_of(group, m, n)
-    approach, rate = motion(group, m, q, v, machine)
-    speed = turning_speed(group, m, v, since, machine)
-    roll_rate = get_row(mesh.numbers, layout.PINION_RADIUS) * speed
-    return mesh_law(
-        mesh,
-        nodes,
-        instant,
-        off,
-        turned,
-        approach,
-        rate,
-        roll_rate,
-        mesh_rows(work, m, n),
-        wide_rows(wide, m, n),
-    )
+    approach, rate = motion(s.group, s.m, q, v, s.machine)
+    speed = turning_speed(s.group, s.m, v, since, s.machine)
+    roll_rate = get_row(s.mesh.numbers, layout.PINION_RADIUS) * speed
+    state = approach, rate, roll_rate
+    return mesh_law(s.mesh, nodes, instant, off, turned, *state, s.own, s.wide)
 
 
 @compiled
-def _write(group, m, seen, row, work, wide):
+def _write(mesh, own, own_wide, seen, row):
     """Write the state of the pairs of a mesh at the begin of a step, the newest pair first."""
-    n, first = width(work), row * layout.N_SEEN
-    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
-    own_wide = wide_rows(wide, m, n)
+    n, first = width(own), row * layout.N_SEEN
     for lane in range(n):
         pitch = mesh.exact[at(layout.PITCH, lane, n)]
         newest = int((own_wide[at(layout.BASE, lane, n)] / pitch) // 1.0)
@@ -89,49 +70,35 @@ def _write(group, m, seen, row, work, wide):
                 seen[at(first + layout.SEEN_PAIRS + k, lane, n)] = force
 
 
-def _correct(group, m, step, changed, machine, work):
+def _correct(s, step, changed):
     """Add to the end of the step what the kinks of a mesh change, in the lanes with any.
 
     ``changed`` holds for every pair 1 where it has a kink.
     """
-    mesh, own = mesh_of(group, m, width(work)), mesh_rows(work, m, width(work))
-    miss(mesh.numbers, changed, own)
+    miss(s.mesh.numbers, changed, s.own)
     any_changed = changed[0] + changed[1] + changed[2]
-    short, early = missed_law(mesh, rows.SHORT, own), missed_law(mesh, rows.EARLY, own)
-    correct_by(group, m, short, early, step, any_changed, machine)
+    short, early = (
+        missed_law(s.mesh, name, s.own) for name in (rows.SHORT, rows.EARLY)
+    )
+    correct_by(s.group, s.m, short, early, step, any_changed, s.machine)
 
 
 @final
 class SpurMeshes(Law):
     """Spur meshes of the one-sided law, in each of which three pairs of teeth are followed."""
 
-    def begin(self, group, m, slot, fresh, step, machine, work, wide, near):
+    def begin(self, s, slot, fresh, step):
         """Nothing: the nodes of the last call are kept."""
 
-    def start(self, group, m, slot, fresh, machine, work, wide, near):
+    def start(self, s, slot, fresh):
         """Push by a mesh at the begin of a step, and set what it remembers where it is fresh."""
-        n, zero = width(work), spread(work, 0.0)
-        mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
-        own_wide = wide_rows(wide, m, n)
-        call(first_pairs, mesh, fresh, own, own_wide)
-        loop(FOLLOWED, lambda j: read_begin(mesh, group.by_tooth, j, own, own_wide))
+        mesh, own, zero = s.mesh, s.own, spread(s.own, 0.0)
+        call(first_pairs, mesh, fresh, own, s.wide)
+        loop(FOLLOWED, lambda j: read_begin(mesh, s.group.by_tooth, j, own, s.wide))
         kept = [get_row(own, rows.PAIR_FORCE + j) for j in range(FOLLOWED)]
-        off = 0.0 - get_row(own, rows.BEHIND)
-        law = _law_at(
-            group,
-            m,
-            rows.NODES,
-            rows.END_AT,
-            off,
-            zero,
-            zero,
-            rows.Q,
-            rows.V,
-            machine,
-            work,
-            wide,
-        )
-        push(group, m, law, machine)
+        off, state = 0.0 - get_row(own, rows.BEHIND), (rows.Q, rows.V)
+        law = _law_at(s, rows.NODES, rows.END_AT, off, zero, zero, *state)
+        push(s.group, s.m, law, s.machine)
         flags = get_row(own, rows.FRESH)
         choose(flags, rows.NORMAL, law.normal, own)
         for j in range(FOLLOWED):
@@ -141,85 +108,58 @@ class SpurMeshes(Law):
             force = where_above(flags, zero, force, kept[j])
             set_row(own, rows.PAIR_FORCE + j, force)
 
-    def write(self, group, m, seen, row, work, wide, near):
+    def write(self, s, seen, row):
         """Write the state of the pairs of a mesh at the begin of a step, the newest pair first."""
-        call(_write, group, m, seen, row, work, wide)
+        call(_write, s.mesh, s.own, s.wide, seen, row)
 
-    def read(self, group, m, slot, next_slot, step, machine, work, wide, near):
+    def read(self, s, slot, next_slot, step):
         """Read the tables of a mesh at the end of the step and set its nodes."""
-        n = width(work)
-        mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
-        own_wide = wide_rows(wide, m, n)
-        has_left = locate(mesh, own, own_wide)
-        when(has_left, lambda: call(take_pairs, mesh, group.by_tooth, own, own_wide))
+        mesh, own, by_tooth = s.mesh, s.own, s.group.by_tooth
+        has_left = locate(mesh, own, s.wide)
+        when(has_left, lambda: call(take_pairs, mesh, by_tooth, own, s.wide))
         # the roll at the end of the step, with every force in it
         ahead = step * get_row(mesh.numbers, layout.PINION_RADIUS)
-        ahead = ahead * mean_speed(group, m, step, machine)
+        ahead = ahead * mean_speed(s.group, s.m, step, s.machine)
         span = ahead - get_row(own, rows.BEHIND)
         per_span = 1.0 / span
 
         def read(j):
-            read_step(mesh, group.by_tooth, j, ahead, span, per_span, own, own_wide)
+            read_step(mesh, by_tooth, j, ahead, span, per_span, own, s.wide)
 
         loop(FOLLOWED, read)
         set_row(own, AHEAD, ahead)
-        set_begun(group, m, machine, own)
+        set_begun(s.group, s.m, s.machine, own)
 
-    def push_middle(self, group, m, step, machine, work, wide, near):
+    def push_middle(self, s, step):
         """Evaluate the law of a mesh in the middle of the step and add its forces."""
-        own, since = mesh_rows(work, m, width(work)), 0.5 * step
-        q, v = rows.MIDDLE_Q, rows.MIDDLE_V
-        turned = rolled(group, m, since, q, machine, own)
-        off = get_row(own, AHEAD) + get_row(own, rows.BEHIND)
-        law = _law_at(
-            group,
-            m,
-            rows.MIDDLE,
-            rows.MIDDLE_AT,
-            turned - 0.5 * off,
-            turned,
-            spread(work, since),
-            q,
-            v,
-            machine,
-            work,
-            wide,
-        )
-        push(group, m, law, machine)
+        since, (q, v) = 0.5 * step, (rows.MIDDLE_Q, rows.MIDDLE_V)
+        turned = rolled(s.group, s.m, since, q, s.machine, s.own)
+        off = get_row(s.own, AHEAD) + get_row(s.own, rows.BEHIND)
+        instant = rows.MIDDLE, rows.MIDDLE_AT, turned - 0.5 * off, turned
+        law = _law_at(s, *instant, spread(s.own, since), q, v)
+        push(s.group, s.m, law, s.machine)
 
-    def push_end(self, group, m, slot, step, machine, work, wide, near):
+    def push_end(self, s, slot, step):
         """Evaluate the law of a mesh at the end of the step and add its forces."""
-        own = mesh_rows(work, m, width(work))
         q, v = rows.END_Q, rows.END_V
-        turned = rolled(group, m, step, q, machine, own)
-        law = _law_at(
-            group,
-            m,
-            rows.NODES,
-            rows.END_AT,
-            turned - get_row(own, AHEAD),
-            turned,
-            spread(work, step),
-            q,
-            v,
-            machine,
-            work,
-            wide,
-        )
-        push(group, m, law, machine)
-        set_row(own, rows.NORMAL, law.normal)
+        turned = rolled(s.group, s.m, step, q, s.machine, s.own)
+        off = turned - get_row(s.own, AHEAD)
+        instant = rows.NODES, rows.END_AT, off, turned
+        law = _law_at(s, *instant, spread(s.own, step), q, v)
+        push(s.group, s.m, law, s.machine)
+        set_row(s.own, rows.NORMAL, law.normal)
 
-    def end(self, group, m, slot, step, machine, work, near):
+    def end(self, s, slot, step):
         """Correct the end of the step for the kinks of a mesh, and shift what it remembers."""
-        own, zero = mesh_rows(work, m, width(work)), spread(work, 0.0)
+        own, zero = s.own, spread(s.own, 0.0)
         changed = tuple(kinked(j, own) for j in range(FOLLOWED))
         is_kinked = any_above(changed[0] + changed[1] + changed[2], zero)
-        when(is_kinked, lambda: _correct(group, m, step, changed, machine, work))
-        turned = rolled(group, m, step, rows.Q, machine, own)
+        when(is_kinked, lambda: _correct(s, step, changed))
+        turned = rolled(s.group, s.m, step, rows.Q, s.machine, own)
         set_row(own, rows.BEHIND, get_row(own, AHEAD) - turned)
         for j in range(FOLLOWED):
             margin = get_row(own, rows.MARGIN + rows.END_AT * FOLLOWED + j)
             set_row(own, rows.MARGIN + j, margin)
 
-    def keep(self, m, work, wide, near):
+    def keep(self, s):
         """Nothing: a mesh has no slots."""
