@@ -80,6 +80,7 @@ PLAIN = {
     "truncated": np.trunc,
     "tail": lambda array, first: array[first:],
     "rows_of": lambda array, n: len(array) // n,
+    "is_filled": lambda array: len(array) > 0,
     "number_at": lambda numbers, place: int(numbers[place]),
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from llvmlite import ir
 from numba.core import types
 
 from gensig.dynamics._written import intrinsic
@@ -32,6 +33,17 @@ def rows_of(typing_context, array, n):
         return builder.udiv(size, args[1])
 
     return types.intp(array, types.intp), build
+
+
+@intrinsic
+def is_filled(typing_context, array):
+    """True for a flat array that holds any number."""
+
+    def build(context, builder, sig, args):
+        size = context.make_array(sig.args[0])(context, builder, args[0]).nitems
+        return builder.icmp_signed("!=", size, ir.Constant(size.type, 0))
+
+    return types.boolean(array), build
 
 
 @intrinsic

@@ -37,7 +37,7 @@ from gensig.dynamics.backends.nystroem._course import (
     set_forces,
     set_rolls,
 )
-from gensig.dynamics.backends.nystroem._flat import number_at, rows_of
+from gensig.dynamics.backends.nystroem._flat import is_filled, number_at, rows_of
 from gensig.dynamics.backends.nystroem._group import (
     Station,
     is_gear_pair,
@@ -103,7 +103,7 @@ class Law(ABC):
         """Keep what the next call begins with."""
 
 
-def pull(forces, group, time, since, q, v, has_dampers, has_sources, machine, wide):
+def pull(forces, group, time, since, q, v, machine, wide):
     """Add all forces but those of meshes, ``since`` s after a step's begin.
 
     Those of each degree of freedom alone are there. ``forces`` are the laws of elements.
@@ -111,8 +111,9 @@ def pull(forces, group, time, since, q, v, has_dampers, has_sources, machine, wi
     couple(group, q, v, machine)
     govern(group, q, v, machine)
     if not is_gear_pair(group):
-        when(has_dampers, lambda: call(damp, group, v, machine))
-        when(has_sources, lambda: call(drive, group, time, since, q, machine, wide))
+        is_damped, is_driven = is_filled(group.damper_other), is_filled(group.sources)
+        when(is_damped, lambda: call(damp, group, v, machine))
+        when(is_driven, lambda: call(drive, group, time, since, q, machine, wide))
     for elements in group.elements:
         kind = elements.kind.instance_class
         law = next(each for each in forces.values() if each.rows is kind)
@@ -123,7 +124,7 @@ def integrator(law: Law, forces: Mapping[str, ForceLaw]) -> Any:
     """The core of machines whose meshes have one law, and whose elements have some of others."""
 
     @traced
-    def start(group, slot, fresh, time, has_dampers, has_sources, work, wide, near):
+    def start(group, slot, fresh, time, work, wide, near):
         """Set what the step remembers in the lanes that are fresh, from one evaluation there."""
         n = width(work)
         machine = machine_rows(work, meshes_of(group), n)
@@ -143,8 +144,6 @@ def integrator(law: Law, forces: Mapping[str, ForceLaw]) -> Any:
             0.0,
             rows.Q,
             rows.V,
-            has_dampers,
-            has_sources,
             machine,
             wide,
         )
@@ -189,8 +188,6 @@ def integrator(law: Law, forces: Mapping[str, ForceLaw]) -> Any:
         step,
         slot,
         next_slot,
-        has_dampers,
-        has_sources,
         lost,
         channels,
         n_channels,
@@ -235,8 +232,6 @@ def integrator(law: Law, forces: Mapping[str, ForceLaw]) -> Any:
                 since,
                 q,
                 v,
-                has_dampers,
-                has_sources,
                 machine,
                 wide,
             )
@@ -280,7 +275,6 @@ def integrator(law: Law, forces: Mapping[str, ForceLaw]) -> Any:
         n = width(work)
         machine = machine_rows(work, meshes_of(group), n)
         begin(group, step, state, work)
-        has_dampers, has_sources = len(group.damper_other) > 0, len(group.sources) > 0
         n_channels = len(channels) if out_row >= 0 else 0
         is_changing = len(group.profile) > profile_rows(group, n) * n
         slot, next_slot = EVEN, ODD
@@ -298,8 +292,6 @@ def integrator(law: Law, forces: Mapping[str, ForceLaw]) -> Any:
                     slot,
                     fresh,
                     time,
-                    has_dampers,
-                    has_sources,
                     work,
                     wide,
                     near,
@@ -323,8 +315,6 @@ def integrator(law: Law, forces: Mapping[str, ForceLaw]) -> Any:
                 step,
                 slot,
                 next_slot,
-                has_dampers,
-                has_sources,
                 lost,
                 channels,
                 n_channels,
