@@ -54,7 +54,6 @@ from gensig.dynamics.backends.nystroem._meshes import (
 from gensig.dynamics.backends.nystroem._slots import near_pairs, write_mesh
 from gensig.dynamics.backends.nystroem.machine_lanes import pack
 from gensig.dynamics.equations import Dynamics
-from gensig.dynamics.pair import PairDynamics
 
 UNLIMITED = 1e30  # N s/m: no damper of a pair is limited
 ROUNDS = 20  # in which chords and the deflection they share converge
@@ -277,10 +276,9 @@ class Classical(Backend):
 
     def check_step(
         self,
-        machine: PairDynamics,
+        machine: Dynamics,
         sampling_rate: float,
         oversampling: int,
-        max_error: float | None,
     ) -> None:
         """Refuse nothing."""
 

@@ -14,7 +14,7 @@ from gensig.dynamics._vector import LANES
 from gensig.dynamics.backends.base import Integration
 from gensig.dynamics.backends.nystroem.machine_lanes import pack
 from gensig.dynamics.backends.nystroem.method import Nystroem
-from gensig.dynamics.equations import Equations
+from gensig.dynamics.equations import STIFFER, Equations
 from gensig.dynamics.pair import Body, PairDynamics, Support
 
 LAW = layout.Law._fields
@@ -171,7 +171,7 @@ class Changed:
 
     @cached_property
     def stiff_rates(self):
-        return self.equations.stiff_rates(np.array([self.pair.mean_mesh_stiffness]))
+        return self.equations.rates(STIFFER * self.pair.mesh_stiffness)
 
     def forces(self, times):
         return self.pair.forces(times) + self.push

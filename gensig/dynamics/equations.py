@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,16 +138,6 @@ class Equations:
         state[n:, :n], state[n:, n:] = -stiffness * per_mass, -damping * per_mass
         return np.linalg.eigvals(state).astype(np.complex128)
 
-    def stiff_rates(self, mesh_stiffness: Array) -> NDArray[np.complex128]:
-        """Eigenvalues that the steps must follow, of meshes of a mean stiffness (mesh,), 1/s."""
-        return self.rates(STIFFER * mesh_stiffness)
-
-    def settling_time(self, mesh_stiffness: Array) -> float:
-        """Time in which the slowest motion that is held falls to 1e-4 (longest 0.45 s), s."""
-        decay = -np.real(self.rates(mesh_stiffness))
-        slowest = float(decay[decay > 1e-3].min(initial=np.inf))
-        return min(LONGEST_SETTLING, math.log(1.0 / SETTLED) / slowest)
-
     def holding(self, deflection: Array) -> Array:
         """Forces that hold a deflection against springs and mean mesh forces, (dof,)."""
         force = self.stiffness @ deflection + self.held * (self.held @ deflection)
@@ -174,47 +165,76 @@ class Equations:
         )
 
 
-class Dynamics(Protocol):
+class Dynamics(ABC):
     """A machine in motion, which can be integrated: a gear pair, or a line of several meshes."""
 
     @property
+    @abstractmethod
     def dofs(self) -> tuple[str, ...]:
         """Names of the degrees of freedom."""
 
     @property
+    @abstractmethod
     def equations(self) -> Equations:
         """The machine as numbers."""
 
     @property
+    @abstractmethod
+    def mesh_stiffness(self) -> Array:
+        """Mean stiffness of every mesh, (mesh,) N/m."""
+
+    @property
+    @abstractmethod
     def is_steady(self) -> bool:
         """True where neither speed nor torques change over time."""
 
     @property
+    @abstractmethod
     def rest(self) -> Array:
         """Deflection about which the machine moves, its reference not turned, (dof,)."""
 
-    @property
-    def stiff_rates(self) -> NDArray[np.complex128]:
-        """Eigenvalues with the meshes held stiffer than their mean, 1/s."""
-
-    @property
-    def settling_time(self) -> float:
-        """Time after which the start's transient has fallen to 1e-4, s."""
-
+    @abstractmethod
     def start(self, time: float) -> tuple[Array, Array]:
         """Deflections and their rates from which a motion settles at a nominal time, (dof,) each.
 
         Rates are 0 where the machine starts at rest.
         """
 
+    @abstractmethod
     def course(self, times: Array) -> tuple[Array, Array]:
         """Angle in rad since time 0 and speed in rad/s of the reference at times in s, (time,).
 
         ``times`` increase and hold 0.
         """
 
+    @abstractmethod
     def forces(self, times: Array) -> Array:
         """Torques and forces that follow no angle, on the degrees of freedom, (time, dof)."""
 
+    @abstractmethod
     def factors(self, times: Array) -> Array:
         """Factors of the torques over an angle at times in s, (time, source)."""
+
+    @cached_property
+    def stiff_rates(self) -> NDArray[np.complex128]:
+        """Eigenvalues that the steps must follow: of meshes stiffer than their mean, 1/s."""
+        return self.equations.rates(STIFFER * self.mesh_stiffness)
+
+    @cached_property
+    def settling_time(self) -> float:
+        """Time in which the slowest motion that is held falls to 1e-4 (longest 0.45 s), s."""
+        decay = -np.real(self.equations.rates(self.mesh_stiffness))
+        slowest = float(decay[decay > 1e-3].min(initial=np.inf))
+        return min(LONGEST_SETTLING, math.log(1.0 / SETTLED) / slowest)
+
+    @property
+    def stiffest_motion(self) -> str:
+        """Degree of freedom that springs, dampers and meshes hold hardest for its mass."""
+        equations = self.equations
+        spring, damper = np.diag(equations.stiffness), np.diag(equations.damping)
+        held = spring + equations.held**2
+        damped = damper + equations.held_damping * equations.held**2
+        for mesh, stiffness in zip(equations.meshes, self.mesh_stiffness, strict=True):
+            held = held + stiffness * mesh.push(len(held)) ** 2
+        rates = np.sqrt(held / equations.mass), damped / equations.mass
+        return self.dofs[int(np.argmax(np.maximum(*rates)))]

@@ -14,7 +14,10 @@ from gensig.dynamics.backends.registry import (
     RETIRED_BACKEND,
     backend_names,
 )
-from gensig.dynamics.backends.step_limits import CoarseStepWarning
+from gensig.dynamics.backends.step_limits import (
+    CoarseStepWarning,
+    warn_of_coarse_step,
+)
 from gensig.dynamics.pair import DOFS, PairDynamics
 from gensig.errors import ConfigError, SimulationError
 
@@ -120,15 +123,19 @@ def records_together(solver: Solver) -> int:
 
 
 def check_machine(dynamics: PairDynamics, solver: Solver, sampling_rate: float) -> None:
-    """Raise SimulationError for a machine that the backend cannot integrate at this step."""
+    """Raise SimulationError for a machine that the backend cannot integrate at this step.
+
+    Warns of a coarse step whose error is not looked at.
+    """
     if solver.backend == IMPLICIT_BACKEND:
         raise SimulationError(
             f"solver.backend = {IMPLICIT_BACKEND} integrates drive lines; for a gear pair take "
             f"solver.backend={' or '.join(BACKENDS)}"
         )
-    BACKENDS[solver.backend].check_step(
-        dynamics, sampling_rate, solver.oversampling, solver.max_error
-    )
+    per_sample = solver.oversampling
+    BACKENDS[solver.backend].check_step(dynamics, sampling_rate, per_sample)
+    if solver.backend == EXPLICIT_BACKEND and solver.max_error is None:
+        warn_of_coarse_step(dynamics, sampling_rate, per_sample)
 
 
 def check_memory(

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics.equations import PAIR_SLIDE, Equations, Mesh
+from gensig.dynamics.equations import PAIR_SLIDE, Dynamics, Equations, Mesh
 from gensig.dynamics.helical import AXIAL_DOFS, axial_reach, pitches
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.system import LumpedSystem
@@ -132,7 +132,7 @@ def solid_disc(
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PairDynamics:
+class PairDynamics(Dynamics):
     """All parameters of the motion of one gear pair.
 
     No slots: the equations are cached.
@@ -315,15 +315,10 @@ class PairDynamics:
         root = math.sqrt(self.mean_mesh_stiffness * self.equivalent_mass)
         return 2.0 * self.table.options.damping_ratio * root
 
-    @cached_property
-    def stiff_rates(self) -> NDArray[np.complex128]:
-        """Eigenvalues with the mesh held at 1.2 times its mean stiffness, 1/s."""
-        return self.equations.stiff_rates(np.array([self.mean_mesh_stiffness]))
-
-    @cached_property
-    def settling_time(self) -> float:
-        """Time after which the start's transient has fallen to 1e-4 (longest 0.45 s), s."""
-        return self.equations.settling_time(np.array([self.mean_mesh_stiffness]))
+    @property
+    def mesh_stiffness(self) -> Array:
+        """As ``Dynamics.mesh_stiffness``."""
+        return np.array([self.mean_mesh_stiffness])
 
     @cached_property
     def equations(self) -> Equations:

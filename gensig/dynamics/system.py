@@ -42,15 +42,3 @@ class LumpedSystem:
                 raise SimulationError(
                     f"the {name} matrix would feed energy in; check the signs of the supports"
                 )
-
-
-def stiffest_motion(
-    system: LumpedSystem, direction: Array, mesh_stiffness: float
-) -> str:
-    """Degree of freedom that springs, dampers and the mesh hold hardest for its mass.
-
-    ``direction`` (dof,) is the gradient of the approach.
-    """
-    held = np.diag(system.stiffness) + mesh_stiffness * direction**2
-    damped = np.diag(system.damping) / system.mass
-    return system.names[int(np.argmax(np.maximum(np.sqrt(held / system.mass), damped)))]

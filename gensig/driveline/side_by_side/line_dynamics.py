@@ -14,18 +14,23 @@ from gensig.driveline.running import RunningLine, touched_dofs, turning_sense
 from gensig.driveline.side_by_side.line_statics import line_at_rest
 from gensig.driveline.time.course import ShaftTorque
 from gensig.driveline.time.mesh_friction import slide_direction
-from gensig.dynamics.backends.nystroem.stability import stable_rate
-from gensig.dynamics.equations import A_TURN, NONE, Equations, Mesh, OverAngle
-from gensig.dynamics.integrator import Solver
+from gensig.dynamics.equations import (
+    A_TURN,
+    NONE,
+    Dynamics,
+    Equations,
+    Mesh,
+    OverAngle,
+)
 from gensig.dynamics.mesh_teeth import MeshTeeth
-from gensig.errors import SimulationError, StepError
+from gensig.errors import SimulationError
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LineDynamics:
+class LineDynamics(Dynamics):
     """All parameters of the motion of one line of toothed meshes.
 
     No slots: what follows from them is cached.
@@ -117,16 +122,6 @@ class LineDynamics:
         return np.array([teeth.mean_stiffness(force) for teeth, force in meshes])
 
     @cached_property
-    def stiff_rates(self) -> NDArray[np.complex128]:
-        """Eigenvalues with the meshes held at 1.2 times their mean stiffness, 1/s."""
-        return self.equations.stiff_rates(self.mesh_stiffness)
-
-    @cached_property
-    def settling_time(self) -> float:
-        """Time after which the start's transient has fallen to 1e-4 (longest 0.45 s), s."""
-        return self.equations.settling_time(self.mesh_stiffness)
-
-    @cached_property
     def rest(self) -> Array:
         """Deflection about which the line moves, its reference not turned, (dof,)."""
         start, rotation = self.static_start(0.0), self.running.line.rotation
@@ -216,16 +211,6 @@ def line_dynamics(running: RunningLine, *, angles: Sequence[int]) -> LineDynamic
         senses=np.array([turning_sense(running.machine, m) for m in meshes]),
         angles=tuple(running.dof(node) for node in angles),
     )
-
-
-def check_line(line: LineDynamics, solver: Solver, sampling_rate: float) -> None:
-    """Raise StepError for an unstable step."""
-    needed = math.ceil(stable_rate(line.stiff_rates) / sampling_rate)
-    if needed > solver.oversampling:
-        raise StepError(
-            f"solver.oversampling = {solver.oversampling} makes too long steps for "
-            f"solver.backend=nystroem; raise solver.oversampling to at least {needed}"
-        )
 
 
 def _teeth(running: RunningLine, m: int) -> MeshTeeth:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from gensig.driveline.side_by_side.line_dynamics import (
     LineDynamics,
-    check_line,
     line_dynamics,
 )
 from gensig.driveline.side_by_side.line_mesh_states import line_mesh_state
@@ -59,7 +58,8 @@ def simulate_lines(runs: Sequence[LineRun]) -> list[CleanRecord | SimulationErro
 
 def _checked_dynamics(run: LineRun) -> LineDynamics:
     line = dynamics_of(run)
-    check_line(line, run.system.solver, _rate(run))
+    per_sample = run.system.solver.oversampling
+    BACKENDS[EXPLICIT_BACKEND].check_step(line, _rate(run), per_sample)
     return line
 
 

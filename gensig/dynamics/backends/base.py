@@ -13,7 +13,6 @@ from gensig.dynamics._layout import MOST_PAIRS as MOST_PAIRS
 from gensig.dynamics._layout import N_SEEN as N_SEEN
 from gensig.dynamics._layout import SEEN_FORCE as SEEN_FORCE
 from gensig.dynamics.equations import Dynamics
-from gensig.dynamics.pair import PairDynamics
 from gensig.errors import ConfigError
 
 Array = NDArray[np.float64]
@@ -92,10 +91,9 @@ class Backend(ABC):
     @abstractmethod
     def check_step(
         self,
-        machine: PairDynamics,
+        machine: Dynamics,
         sampling_rate: float,
         oversampling: int,
-        max_error: float | None,
     ) -> None:
         """Raise SimulationError for a machine that the method cannot integrate at this step."""
 

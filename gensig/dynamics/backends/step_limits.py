@@ -7,8 +7,7 @@ import warnings
 
 import numpy as np
 
-from gensig.dynamics.pair import PairDynamics
-from gensig.dynamics.system import stiffest_motion
+from gensig.dynamics.equations import Dynamics
 from gensig.errors import StepError
 
 FASTEST_GEARS = 1e6  # Hz, above which sizes are wrong rather than steps too long
@@ -26,7 +25,7 @@ class CoarseStepWarning(UserWarning):
 
 
 def too_long_steps(
-    dynamics: PairDynamics, sampling_rate: float, oversampling: int, needed: int
+    dynamics: Dynamics, sampling_rate: float, oversampling: int, needed: int
 ) -> StepError:
     """The refusal of steps that a machine cannot follow, with the motion that decides it.
 
@@ -34,11 +33,7 @@ def too_long_steps(
     """
     step = 1.0 / (sampling_rate * oversampling)
     frequency = float(np.abs(dynamics.stiff_rates).max()) / (2 * math.pi)
-    motion = stiffest_motion(
-        dynamics.system(),
-        dynamics.approach_direction(),
-        dynamics.mean_mesh_stiffness,
-    )
+    motion = dynamics.stiffest_motion
     remedy = f"raise solver.oversampling to at least {needed}"
     if frequency > FASTEST_GEARS:
         remedy += f", or check mass, stiffness and damping of {motion}"
@@ -49,7 +44,7 @@ def too_long_steps(
 
 
 def warn_of_coarse_step(
-    dynamics: PairDynamics, sampling_rate: float, oversampling: int
+    dynamics: Dynamics, sampling_rate: float, oversampling: int
 ) -> None:
     """Warn of a step that is long for the mesh mode."""
     step = 1.0 / (sampling_rate * oversampling)

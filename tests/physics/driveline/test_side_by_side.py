@@ -1,5 +1,6 @@
 """Lines in the two-evaluation core: a pair as a line, two stages, and what they agree with."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from side_by_side_lines import (
 )
 
 from gensig.driveline.reading import read_line_machine
+from gensig.driveline.side_by_side import line_records
 from gensig.dynamics.decimation import in_band_error
 from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
@@ -340,6 +342,17 @@ def test_a_missing_tooth_is_felt_by_its_shaft_mates_too(two_stage):
     change /= sound.acceleration.std(axis=1)
     assert change[:2].min() > 0.2
     assert 0.01 < change[2:].min() < change[2:].max() < 0.2
+
+
+def test_too_long_steps_are_refused_with_the_motion_that_decides_it(two_stage):
+    slow = replace(two_stage, sensing=replace(two_stage.sensing, sampling_rate=4000.0))
+    (error,) = simulate_together([run_of(with_solver(slow, max_error=None))])
+    assert isinstance(error, SimulationError)
+    found = re.search(
+        r"the stiffest motion, (.*) at \d+ Hz; .* to at least (\d+)$", str(error)
+    )
+    assert found[1] in line_records.dynamics_of(run_of(slow)).dofs
+    assert int(found[2]) > two_stage.solver.oversampling
 
 
 def test_a_mesh_without_tabulated_teeth_is_refused():

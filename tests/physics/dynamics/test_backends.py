@@ -35,7 +35,7 @@ LEAST_RATE = 1e4  # Hz, lowest sampling rate of the backend below
 class Lsoda(Backend):
     """Adaptive multistep method of scipy on the plain equations, for steady spur pairs."""
 
-    def check_step(self, machine, sampling_rate, oversampling, max_error) -> None:
+    def check_step(self, machine, sampling_rate, oversampling) -> None:
         if sampling_rate < LEAST_RATE:
             raise SimulationError(f"lsoda: {sampling_rate:g} Hz is too slow")
 

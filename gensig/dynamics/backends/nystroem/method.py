@@ -22,10 +22,8 @@ from gensig.dynamics.backends.nystroem.stability import stable_rate
 from gensig.dynamics.backends.step_limits import (
     COARSE_STABILITY,
     too_long_steps,
-    warn_of_coarse_step,
 )
 from gensig.dynamics.equations import Dynamics
-from gensig.dynamics.pair import PairDynamics
 
 
 def coarsest_oversampling(
@@ -68,17 +66,14 @@ class Nystroem(Backend):
 
     def check_step(
         self,
-        machine: PairDynamics,
+        machine: Dynamics,
         sampling_rate: float,
         oversampling: int,
-        max_error: float | None,
     ) -> None:
-        """Raise StepError for an unstable step; warn of a coarse unchecked one."""
+        """Raise StepError for an unstable step."""
         needed = math.ceil(stable_rate(machine.stiff_rates) / sampling_rate)
         if needed > oversampling:
             raise too_long_steps(machine, sampling_rate, oversampling, needed)
-        if max_error is None:
-            warn_of_coarse_step(machine, sampling_rate, oversampling)
 
     def records_together(self, precision: str) -> int:
         """Number of vector lanes."""
