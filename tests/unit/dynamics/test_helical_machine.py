@@ -9,8 +9,13 @@ from closeness import assert_close
 from lane_tools import with_teeth
 
 from gensig.dynamics._layout import MOST_PAIRS
-from gensig.dynamics.backends.nystroem._group import HelicalPairGroup
-from gensig.dynamics.backends.nystroem.machine_lanes import missing_cells, pack
+from gensig.dynamics.backends.nystroem._group import ChordGroup, HelicalPairGroup
+from gensig.dynamics.backends.nystroem.machine_lanes import (
+    group_kind,
+    missing_cells,
+    pack,
+)
+from gensig.dynamics.equations import N_IN_PLANE
 from gensig.dynamics.helical import AXIAL_DOFS, half_lag, pitches
 from gensig.dynamics.integrator import check_channels
 from gensig.dynamics.mesh_statics import loss_arm
@@ -121,6 +126,19 @@ def test_motor_and_load_follow_the_gears(helical, machine):
     approach = whole.approach_direction() @ whole.system().rotation
     assert_close(approach, 0.0, atol=1e-15)
     assert isinstance(pack([whole], 1e-6), HelicalPairGroup)
+
+
+def test_gears_that_do_not_move_along_their_axes_are_another_group(helical):
+    """As in a drive line of one helical mesh, whose other bodies stand as those of a pair."""
+    equations = helical.equations
+    (mesh,) = equations.meshes
+    in_plane = {
+        name: getattr(mesh, name)[:N_IN_PLANE] for name in ("touched", "reach", "slide")
+    }
+    flat = replace(equations, meshes=(replace(mesh, **in_plane),))
+    assert flat.is_gear_pair
+    assert group_kind(equations) is HelicalPairGroup
+    assert group_kind(flat) is ChordGroup
 
 
 def test_supports_hold_the_mesh_force_at_rest(helical):

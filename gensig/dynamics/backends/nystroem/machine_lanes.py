@@ -26,7 +26,7 @@ from gensig.dynamics.backends.nystroem._group import (
 )
 from gensig.dynamics.backends.nystroem._pairs import MISSING_COMPLIANCE, MISSING_GAP
 from gensig.dynamics.backends.nystroem.force_law import ForceLaw, of_law
-from gensig.dynamics.equations import A_TURN, N_MOTIONS, Dynamics, Equations
+from gensig.dynamics.equations import A_TURN, N_IN_PLANE, Dynamics, Equations
 from gensig.dynamics.lanes import (
     MeshLanes,
     ToothRows,
@@ -60,18 +60,14 @@ def is_followed_by_three(teeth: MeshTeeth) -> bool:
 
 def group_kind(equations: Equations) -> type[Group]:
     """The type of the group that machines of such equations make."""
-    all_teeth, is_pair = (
-        [mesh.teeth for mesh in equations.meshes],
-        equations.is_gear_pair,
-    )
-    if all(map(is_followed_by_three, all_teeth)):
+    is_pair, first = equations.is_gear_pair, equations.meshes[0]
+    if len(first.touched) > N_IN_PLANE:
+        return HelicalPairGroup if is_pair else AxialChordGroup
+    if all(is_followed_by_three(mesh.teeth) for mesh in equations.meshes):
         return SpurPairGroup if is_pair else SpurGroup
-    if is_pair and isinstance(all_teeth[0].table, PairTable):
+    if is_pair and isinstance(first.teeth.table, PairTable):
         return AnyLawPairGroup
-    if is_pair:
-        return HelicalPairGroup
-    n_motions = len(equations.meshes[0].touched)
-    return AxialChordGroup if n_motions == N_MOTIONS else ChordGroup
+    return ChordGroup
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
