@@ -153,7 +153,7 @@ class Equations:
         """
         mesh = self.meshes[0]
         plane = mesh.reach[:N_IN_PLANE]
-        joined = self.stiffness != 0.0
+        joined = (self.stiffness != 0.0) | np.eye(len(self.mass), dtype=np.bool_)
         return (
             len(self.meshes) == 1
             and not self.sources
