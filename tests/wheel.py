@@ -119,11 +119,12 @@ def environment_with(wheel: Path, folder: Path) -> Path:
 def lend_compiled(python: Path) -> None:
     """Copy the compiled kernels of this environment to the wheel, whose files are the same."""
     from gensig.driveline.time._newmark_kernels import advance
-    from gensig.dynamics.backends.nystroem._spur_meshes import integrate
+    from gensig.dynamics._record_kernels import low_pass
+    from gensig.dynamics.backends.nystroem._pairs import take_pairs
     from gensig.mesh._kernels import lower_envelope
     from gensig.mesh.sliced._slice_kernels import solve_slices
 
-    for kernel in (advance, integrate, lower_envelope, solve_slices):
+    for kernel in (advance, low_pass, take_pairs, lower_envelope, solve_slices):
         original = Path(kernel.__code__.co_filename).parent
         package = site_packages(python) / original.relative_to(ROOT)
         for source in original.glob("*.py"):
