@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 import gensig.compilation
 from gensig.dynamics.mesh_teeth import MeshTeeth
@@ -18,6 +19,10 @@ from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
+
+# An example that takes long on a busy machine is no failure.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 # A cold cache of kernels adds no line to what a command prints; test_progress has a process for it.
 gensig.compilation.on_compilation = lambda *told: nullcontext()

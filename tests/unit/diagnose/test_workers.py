@@ -136,4 +136,6 @@ def test_a_call_whose_worker_was_killed_runs_again_and_an_error_says_so_in_the_e
         GensigError, match=r"died 3 times \(out of memory\?\); use fewer"
     ):
         call_all(poisoned, (), (0, 1), **calls)
+    for worker in multiprocessing.active_children():  # one may just be ending
+        worker.join(timeout=10.0)
     assert multiprocessing.active_children() == []
