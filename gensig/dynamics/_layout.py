@@ -25,7 +25,6 @@ FAR_NEAR = (
 # rows of Group.numbers
 (
     PINION_RADIUS,
-    WHEEL_RADIUS,
     PATH,
     PITCH_POINT,
     START_CURVATURE,
@@ -41,7 +40,7 @@ FAR_NEAR = (
     HALF_LAG,
     MIDDLE_POINT,
     N_NUMBERS,
-) = range(17)
+) = range(16)
 # rows of Group.exact, float64 in every precision: a long roll must not lose the pairs' positions
 (
     EXACT_RADIUS,

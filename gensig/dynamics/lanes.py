@@ -125,7 +125,6 @@ def mesh_numbers(mesh: Mesh, rest: Array, step: float) -> tuple[float, ...]:
         per_switch_width = 2.0 / (pair.pinion.base_radius * mesh.speed * step)
     return (
         pair.pinion.base_radius,
-        pair.wheel.base_radius,
         pair.path_of_contact,
         pair.pitch_point,
         pair.start_curvature_radius,
