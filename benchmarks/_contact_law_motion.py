@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from benchmarks._mesh_numbers import MeshNumbers
 from gensig.dynamics.system import LumpedSystem
-from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS, PairTable
+from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS
+from gensig.mesh.tooth_table import ToothTable
 
 Array = NDArray[np.float64]
 
@@ -48,17 +49,16 @@ class Mesh(NamedTuple):
     per_log: float
 
 
-def mesh_at_loads(table: PairTable, loads: Array) -> Mesh:
+def mesh_at_loads(table: ToothTable, loads: Array) -> Mesh:
     """One table of gensig at loads, (load,) N in geometric progression; the wheel must be sound."""
-    pinion, wheel = table.pinion, table.wheel
-    logs, n_loads = np.log(loads), len(loads)
-    compliance = pinion.compliance + wheel.compliance - table.shared_compliance
-    slope = pinion.compliance_slope + wheel.compliance_slope
+    pinion, logs, n_loads = table.pinion, np.log(loads), len(loads)
+    # the one kind of the wheel; the chord takes the place of the load
+    compliance, slope, gap, gap_slope = (column[:, 0] for column in table.pairs)
     return Mesh(
-        compliance=np.repeat(compliance[:, None], n_loads, axis=1),
-        slope=np.repeat(slope[:, None], n_loads, axis=1),
-        gap=(pinion.gap + wheel.gap)[:, None],
-        gap_slope=(pinion.gap_slope + wheel.gap_slope)[:, None],
+        compliance=np.repeat(compliance - table.shared_compliance, n_loads, axis=1),
+        slope=np.repeat(slope, n_loads, axis=1),
+        gap=gap,
+        gap_slope=gap_slope,
         kind=np.where(pinion.present[pinion.kind], pinion.kind, -1),
         first_log=float(logs[0]),
         per_log=float((n_loads - 1) / (logs[-1] - logs[0])),

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from benchmarks._mesh_numbers import MeshNumbers, mesh_numbers
 from gensig.dynamics.pair import PairDynamics
-from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS, GearTable
+from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS
+from gensig.mesh.tooth_table import GearTeeth
 
 Array = NDArray[np.float64]
 
@@ -54,7 +55,6 @@ def machine(dynamics: PairDynamics) -> Machine:
         raise ValueError(
             f"{len(system.mass)} degrees of freedom; {N_DOF} are written out here"
         )
-    pinion, wheel = _columns(table.pinion), _columns(table.wheel)
     return Machine(
         mesh=mesh_numbers(dynamics),
         pinion_kind=_kinds(table.pinion),
@@ -63,7 +63,7 @@ def machine(dynamics: PairDynamics) -> Machine:
         wheel_error=dynamics.teeth.errors[1],
         pinion_tilt=dynamics.teeth.tilts[0],
         wheel_tilt=dynamics.teeth.tilts[1],
-        table=pinion[:, None] + wheel[None],
+        table=np.stack(table.pairs, axis=-1)[:, :, 0],
         inverse_mass=1.0 / system.mass,
         stiffness=np.diag(system.stiffness).copy(),
         damper=np.diag(system.damping).copy(),
@@ -71,14 +71,8 @@ def machine(dynamics: PairDynamics) -> Machine:
     )
 
 
-def _columns(side: GearTable) -> Array:
-    return np.stack(
-        [side.compliance, side.compliance_slope, side.gap, side.gap_slope], axis=-1
-    )
-
-
-def _kinds(side: GearTable) -> NDArray[np.int64]:
-    return np.where(side.present[side.kind], side.kind, -1)
+def _kinds(teeth: GearTeeth) -> NDArray[np.int64]:
+    return np.where(teeth.present[teeth.kind], teeth.kind, -1)
 
 
 @_compiled

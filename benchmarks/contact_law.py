@@ -31,7 +31,8 @@ from gensig.faults.base import Fault, faulty_teeth
 from gensig.faults.registry import read_faults
 from gensig.mesh.face import slice_gaps
 from gensig.mesh.load_distribution import pair_states, static_mesh
-from gensig.mesh.pair_table import PairTable, flank_sides, pair_table
+from gensig.mesh.pair_table import flank_sides, pair_table
+from gensig.mesh.tooth_table import ToothTable
 from gensig.plan.request import read_request
 from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.registry import read_system
@@ -132,7 +133,7 @@ def mesh_of(this: Case, law: str, n_loads: int = N_LOADS) -> Mesh:
 
 
 def change_with_load(
-    this: Case, table: PairTable, loads: Array, *, resharing: bool
+    this: Case, table: ToothTable, loads: Array, *, resharing: bool
 ) -> Array:
     """Contact compliance at loads, (load, 1) N, less that at the table's, (kind, load, node) m/N,
     by pinion tooth.
@@ -141,13 +142,11 @@ def change_with_load(
     arguments = system.pair, table.position, system.material, system.mesh
     width, force = system.pair.pinion.face_width, system.mesh_force
     law = flank_sides(*arguments, force)["pinion"].law
-    at_force = pair_table(
-        system.pair, system.material, system.mesh, load=force
-    ).pinion.compliance[0]
+    of_pinion = table.parts[0].compliance[0, 0, 0]
+    heavy = pair_table(system.pair, system.material, system.mesh, load=force)
+    at_force = heavy.parts[0].compliance[0, 0, 0]
     # the load at which the secant was taken, from what it costs
-    own = force * np.exp(
-        (at_force - table.pinion.compliance[0]) * width / law.factor * law.log_weight
-    )
+    own = force * np.exp((at_force - of_pinion) * width / law.factor * law.log_weight)
     side = flank_sides(*arguments, own)["pinion"]
     sound = law.compliance(width, loads) - law.compliance(width, own)
     change = np.repeat(sound[None], len(table.pinion.present), axis=0)

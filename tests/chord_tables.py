@@ -12,38 +12,28 @@ import numpy as np
 from gensig.dynamics.pair import Body, PairDynamics
 from gensig.geometry.contact import GearPair
 from gensig.mesh.load_distribution import loaded_pair_table
-from gensig.mesh.pair_table import FIRST_PITCH, LAST_PITCH, PairTable
-from gensig.mesh.sliced.sliced_table import SlicedTable
+from gensig.mesh.pair_table import FIRST_PITCH, LAST_PITCH
 from gensig.mesh.smooth_table import smooth
+from gensig.mesh.tooth_table import TablePart, ToothTable
 
 FARTHEST = 1e-3  # m, gap of a pair that is nowhere near
 
 
-def as_chords(table: PairTable, n_chords: int = 1) -> SlicedTable:
+def as_chords(table: ToothTable, n_chords: int = 1) -> ToothTable:
     """A spur pair's table as chords that are all alike."""
 
-    def both(name):
-        pinion, wheel = getattr(table.pinion, name), getattr(table.wheel, name)
-        return np.repeat((pinion[:, None] + wheel[None])[:, :, None], n_chords, axis=2)
-
-    return SlicedTable(
-        pair=table.pair,
-        options=table.options,
-        position=table.position,
-        first_pitch=FIRST_PITCH,
-        last_pitch=LAST_PITCH,
+    columns = (np.repeat(column, n_chords, axis=2) for column in table.pairs)
+    return replace(
+        table,
         depth=5e-6 * np.arange(n_chords),
-        compliance=both("compliance"),
-        compliance_slope=both("compliance_slope"),
-        gap=both("gap"),
-        gap_slope=both("gap_slope"),
-        pinion_kind=table.pinion.kind,
-        wheel_kind=table.wheel.kind,
-        pinion_present=table.pinion.present,
-        wheel_present=table.wheel.present,
-        shared_compliance=table.shared_compliance,
+        parts=(TablePart._make(columns),),
         set_chord=n_chords - 1,
     )
+
+
+def repeated(part: TablePart, n_kinds: int) -> TablePart:
+    """A part whose kinds of pinion teeth come ``n_kinds`` times, one after the other."""
+    return TablePart._make(np.concatenate(n_kinds * [column]) for column in part)
 
 
 def helical_pair(pair: GearPair, helix_angle: float) -> GearPair:
@@ -76,12 +66,10 @@ class Slices:
             crowning * (2.0 * across - 1.0) ** 2,
             self.spur.shared_compliance,
         )
-        own = (
-            self.spur.pinion.compliance[0] + self.spur.wheel.compliance[0] - self.shared
-        )
+        own = self.spur.pairs.compliance[0, 0, 0] - self.shared
         self.own, self.gap = (
             own * n_slices,
-            self.spur.pinion.gap[0] + self.spur.wheel.gap[0],
+            self.spur.pairs.gap[0, 0, 0],
         )
 
     def at(self, position):
@@ -101,7 +89,7 @@ class Slices:
     def last_pitch(self) -> int:
         return LAST_PITCH + math.ceil(self.lag[-1] / self.pair.base_pitch)
 
-    def table(self, depth) -> SlicedTable:
+    def table(self, depth) -> ToothTable:
         """Chords between depths (chord,) m, the last of which goes on as from there to once and a
         half as deep.
         """
@@ -116,24 +104,20 @@ class Slices:
         forces = np.array([self.force_at(position, first + knot) for knot in knots])
         own = np.diff(knots)[:, None] / np.maximum(np.diff(forces, axis=0), 1e-6)
         gap = first + knots[:-1, None] - forces[:-1] * own
-        own, own_slope = smooth(own, pitch / per_pitch, np.inf)
-        gap, gap_slope = smooth(gap, pitch / per_pitch, np.inf)
-        counts = self.pair.pinion.n_teeth, self.pair.wheel.n_teeth
-        return SlicedTable(
+        columns = (
+            *smooth(own + self.shared, pitch / per_pitch, np.inf),
+            *smooth(gap, pitch / per_pitch, np.inf),
+        )
+        return ToothTable(
             pair=self.pair,
             options=self.spur.options,
             position=position,
             first_pitch=FIRST_PITCH,
             last_pitch=self.last_pitch,
             depth=np.asarray(depth),
-            compliance=(own + self.shared)[None, None],
-            compliance_slope=own_slope[None, None],
-            gap=gap[None, None],
-            gap_slope=gap_slope[None, None],
-            pinion_kind=np.zeros(counts[0], dtype=int),
-            wheel_kind=np.zeros(counts[1], dtype=int),
-            pinion_present=np.array([True]),
-            wheel_present=np.array([True]),
+            pinion=self.spur.pinion,
+            wheel=self.spur.wheel,
+            parts=(TablePart._make(column[None, None] for column in columns),),
             shared_compliance=self.shared,
             set_chord=len(depth) - 1,
         )
@@ -154,7 +138,7 @@ def on_axial_supports(
     return replace(body, support=support, tilt_inertia=tilt_inertia)
 
 
-def with_table(dynamics: PairDynamics, table: SlicedTable) -> PairDynamics:
+def with_table(dynamics: PairDynamics, table: ToothTable) -> PairDynamics:
     """The same machine on another table, its gears held along their axes."""
     return replace(
         dynamics,

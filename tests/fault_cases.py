@@ -15,7 +15,8 @@ import yaml
 
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.faults.registry import FAULTS, read_faults
-from gensig.mesh.pair_table import GearTable, PairTable, pair_table
+from gensig.mesh.pair_table import pair_table
+from gensig.mesh.tooth_table import ToothTable
 from gensig.systems.spur_pair import SpurPair
 
 GEARS = ("pinion", "wheel")
@@ -147,7 +148,7 @@ def one(kind: str, **changes: Any) -> Fault:
     return result
 
 
-def heavy_table(system: SpurPair, *faults: Fault) -> PairTable:
+def heavy_table(system: SpurPair, *faults: Fault) -> ToothTable:
     """The table for pairs that carry the whole load alone, wherever they are."""
     teeth = faulty_teeth(system.pair, faults)
     return pair_table(
@@ -155,8 +156,27 @@ def heavy_table(system: SpurPair, *faults: Fault) -> PairTable:
     )
 
 
-def side_of(table: PairTable, gear: str) -> GearTable:
-    return table.pinion if gear == "pinion" else table.wheel
+@dataclass(frozen=True, kw_only=True)
+class Side:
+    """One gear's addend of a spur table, (kind, node) each, and the kinds of its teeth."""
+
+    compliance: np.ndarray
+    compliance_slope: np.ndarray
+    gap: np.ndarray
+    gap_slope: np.ndarray
+    kind: np.ndarray
+    present: np.ndarray
+
+
+def side_of(table: ToothTable, gear: str) -> Side:
+    number = ("pinion", "wheel").index(gear)
+    teeth, part = (table.pinion, table.wheel)[number], table.parts[number]
+    columns = part._asdict().items()
+    return Side(
+        **{name: np.squeeze(values, axis=(1 - number, 2)) for name, values in columns},
+        kind=teeth.kind,
+        present=teeth.present,
+    )
 
 
 def deflection(system: SpurPair, *faults: Fault, tooth: int = 0) -> np.ndarray:
@@ -182,5 +202,5 @@ def deflection(system: SpurPair, *faults: Fault, tooth: int = 0) -> np.ndarray:
     return (gap + compliance * system.mesh_force)[on_path(table)]
 
 
-def on_path(table: PairTable) -> np.ndarray:
+def on_path(table: ToothTable) -> np.ndarray:
     return (table.position >= 0.0) & (table.position <= table.pair.path_of_contact)

@@ -31,7 +31,7 @@ from gensig.driveline.machine_checks import (
     check_sensing,
     check_solver,
     require_followed,
-    spur_table,
+    require_spur,
     warn_of_supports,
 )
 from gensig.driveline.mesh_phase import driving_angle
@@ -75,8 +75,8 @@ from gensig.geometry.contact import SIDES, GearPair
 from gensig.geometry.gear import Gear
 from gensig.mesh.modification import PLAIN, PairModification, sound_teeth
 from gensig.mesh.options import SliceOptions
-from gensig.mesh.pair_table import N_PAIRS, PairTable
-from gensig.mesh.sliced.sliced_table import SlicedTable
+from gensig.mesh.pair_table import N_PAIRS
+from gensig.mesh.tooth_table import ToothTable
 from gensig.sensing.encoder import Disc
 from gensig.sensing.manufacturing import perfect_specimen
 from gensig.sensing.toothed_wheel import draw_wheel
@@ -228,7 +228,7 @@ class LineMachine(Machine):
         """The law of the followed mesh, hot where the line is."""
         return self.law.at_mesh(self.mesh_number)
 
-    def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable | SlicedTable:
+    def mesh_table(self, faults: Sequence[Fault] = ()) -> ToothTable:
         """Tables of the followed mesh with those of the given faults that it feels."""
         drive = self.engine.drive
         require_teeth(drive, self.mesh_number, faults)
@@ -260,10 +260,11 @@ class LineMachine(Machine):
         """
         name = self.engine.mesh_names[self.mesh_number]
         require_followed(name, faults)
-        law = self.followed_law
+        law, table = self.followed_law, self.mesh_table(faults)
+        require_spur(name, table)
         return stiffness_curves(
             replace(self, material=law.material),
-            spur_table(name, self.mesh_table(faults)),
+            table,
             faults,
             sound_teeth(self.pair, law.modification),
             n_positions=n_positions,

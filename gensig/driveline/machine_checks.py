@@ -15,8 +15,7 @@ from gensig.errors import ConfigError
 from gensig.faults.base import Fault
 from gensig.geometry.contact import SIDES
 from gensig.mesh.options import MeshOptions
-from gensig.mesh.pair_table import PairTable
-from gensig.mesh.sliced.sliced_table import SlicedTable
+from gensig.mesh.tooth_table import ToothTable
 from gensig.systems.base import Machine
 
 Array = NDArray[np.float64]
@@ -87,10 +86,10 @@ def require_followed(name: str, faults: Iterable[Fault]) -> None:
             )
 
 
-def spur_table(name: str, table: PairTable | SlicedTable) -> PairTable:
-    """The table of the followed mesh, named by its nodes; ConfigError for helical gears."""
-    if isinstance(table, PairTable):
-        return table
+def require_spur(name: str, table: ToothTable) -> None:
+    """Raise ConfigError for helical gears of the followed mesh, named by its nodes."""
+    if table.is_separable:
+        return
     raise ConfigError(
         f"system.record_mesh {name} is of helical gears, which have their stiffness slice by "
         "slice; choose a spur mesh, or take its gears with gensig stiffness system=helical_pair"

@@ -37,10 +37,11 @@ from gensig.mesh.modification import (
     sound_teeth,
 )
 from gensig.mesh.options import MeshOptions, SliceOptions
-from gensig.mesh.pair_table import PairTable, node_positions
-from gensig.mesh.sliced.sliced_table import SlicedTable, sliced_table
+from gensig.mesh.pair_table import node_positions
+from gensig.mesh.sliced.sliced_table import sliced_table
 from gensig.mesh.sliced.slices import slice_middles
 from gensig.mesh.thermal.thermal_growth import PairGrowth
+from gensig.mesh.tooth_table import ToothTable
 from gensig.sensing.manufacturing import GearErrors, Specimen
 from gensig.systems.base import home_meshes
 from gensig.systems.run import Start
@@ -113,7 +114,7 @@ class ToothStart:
 @lru_cache(maxsize=48)
 def tooth_table(
     law: ToothLaw, pair: GearPair, faults: tuple[Fault, ...], force: float
-) -> PairTable | SlicedTable:
+) -> ToothTable:
     """Table of a pair under a mean force in N.
 
     Of spur teeth as they are, of helical ones in slices.
@@ -187,7 +188,7 @@ def _table_in_line(
     number: int,
     faults: tuple[Fault, ...],
     force: float,
-) -> PairTable | SlicedTable:
+) -> ToothTable:
     pair, force = machine.drive.pairs[number], reference_force(machine, number, force)
     law = law.at_mesh(number)
     require_drive(pair, law.slices)
@@ -271,9 +272,7 @@ def line_teeth(
     return meshes
 
 
-def followed_mesh(
-    table: PairTable | SlicedTable, specimen: Specimen, start: Start
-) -> MeshTeeth:
+def followed_mesh(table: ToothTable, specimen: Specimen, start: Start) -> MeshTeeth:
     """The teeth of the followed mesh, of a table that has the forms of its specimen."""
     pinion, wheel = (
         specimen.errors_of(side, gear.n_teeth)

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from gensig.dynamics._layout import MOST_PAIRS
 from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
-from gensig.mesh.pair_table import FIRST_PITCH, LAST_PITCH, PairTable
-from gensig.mesh.sliced.sliced_table import SlicedTable
+from gensig.mesh.tooth_table import ToothTable
 
 Array = NDArray[np.float64]
 
@@ -45,14 +44,7 @@ def axial_reach(pair: GearPair) -> Array:
     return slant * np.array([*on_pinion, *on_wheel])
 
 
-def half_lag(table: PairTable | SlicedTable) -> float:
-    """Distance along the path from the slice that enters first to the middle of the face, m."""
-    if isinstance(table, PairTable):
-        return 0.0
-    return 0.5 * table.pair.face_width * math.tan(table.pair.base_helix_angle)
-
-
-def pitches(table: PairTable | SlicedTable) -> tuple[int, int]:
+def pitches(table: ToothTable) -> tuple[int, int]:
     """Whole base pitches from A at which a table begins and ends.
 
     The difference is the number of pairs followed at once.
@@ -61,12 +53,9 @@ def pitches(table: PairTable | SlicedTable) -> tuple[int, int]:
     ------
     ConfigError    for more pairs than are followed
     """
-    if isinstance(table, PairTable):
-        return FIRST_PITCH, LAST_PITCH
-    n_pairs = table.last_pitch - table.first_pitch
-    if n_pairs > MOST_PAIRS:
+    if table.n_pairs > MOST_PAIRS:
         raise ConfigError(
-            f"{n_pairs} pairs of teeth would have to be followed at once, of a total contact "
+            f"{table.n_pairs} pairs of teeth would have to be followed at once, of a total contact "
             f"ratio of {table.pair.total_contact_ratio:.3g}; at most {MOST_PAIRS} are: reduce "
             "face_width_mm or helix_angle_deg"
         )

@@ -14,12 +14,9 @@ from gensig.dynamics import _layout as layout
 from gensig.dynamics._layout import COLUMNS, FAR_NEAR
 from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.equations import Mesh
-from gensig.dynamics.helical import half_lag, pitches
-from gensig.dynamics.mesh_statics import least_gaps
+from gensig.dynamics.helical import pitches
 from gensig.dynamics.mesh_teeth import MeshTeeth
-from gensig.mesh.pair_table import GearTable, PairTable
-from gensig.mesh.sliced.sliced_statics import left_out_energy
-from gensig.mesh.sliced.sliced_table import SlicedTable
+from gensig.mesh.tooth_table import ToothTable, left_out_energy
 
 Array = NDArray[np.float64]
 
@@ -120,7 +117,7 @@ def mesh_numbers(mesh: Mesh, rest: Array, step: float) -> tuple[float, ...]:
     step : s         of the integration, over which the paper's law switches a pair
     """
     table, options, pair = mesh.teeth.table, mesh.teeth.table.options, mesh.teeth.pair
-    lag, per_switch_width = half_lag(table), 0.0
+    lag, per_switch_width = table.half_lag, 0.0
     if options.law != "one_sided":
         per_switch_width = 2.0 / (pair.pinion.base_radius * mesh.speed * step)
     return (
@@ -172,13 +169,12 @@ def near_positions(teeth: MeshTeeth) -> tuple[float, float]:
 def nearest_gaps(teeth: MeshTeeth) -> Array:
     """No less than these are the gaps of any pair of teeth, with their errors, (node,) m."""
     table = teeth.table
-    beyond = table.position - table.pair.pitch_point - half_lag(table)
-    gears = zip(least_gaps(table), teeth.errors, teeth.tilts, strict=True)
-    nearest = [
-        flank + error.min() + np.minimum(tilt.min() * beyond, tilt.max() * beyond)
-        for flank, error, tilt in gears
-    ]
-    return np.asarray(nearest[0] + nearest[1])
+    beyond = table.position - table.pair.pitch_point - table.half_lag
+    nearest = table.first_touch
+    for error, tilt in zip(teeth.errors, teeth.tilts, strict=True):
+        tilted = np.minimum(tilt.min() * beyond, tilt.max() * beyond)
+        nearest = nearest + error.min() + tilted
+    return nearest
 
 
 def _mesh_indices(
@@ -192,9 +188,7 @@ def _mesh_indices(
         _, n_chords, n_nodes, _ = rows.values.shape
         first_pitch, last_pitch = pitches(table)
         per_chord = n_nodes * COLUMNS
-        coast = first_value
-        if isinstance(table, SlicedTable):
-            coast += per_chord * table.set_chord
+        coast = first_value + per_chord * table.set_chord
         indices.append(
             (
                 pair.pinion.n_teeth,
@@ -220,79 +214,63 @@ def _mesh_indices(
 
 def _chord_depths(meshes: Sequence[MeshTeeth]) -> Array:
     """Penetrations from which chords hold, (lane, chord) m, infinite for absent chords."""
-    depths = [getattr(mesh.table, "depth", np.zeros(1)) for mesh in meshes]
+    depths = [mesh.table.depth for mesh in meshes]
     filled = np.full((len(meshes), max(len(depth) for depth in depths)), np.inf)
     for row, depth in zip(filled, depths, strict=True):
         row[: len(depth)] = depth
     return filled
 
 
-def tooth_rows(table: PairTable | SlicedTable) -> ToothRows:
+def tooth_rows(table: ToothTable) -> ToothRows:
     """Rows of the distinct pairs of teeth.
 
-    Spur teeth are stored one by one where pairs of them would take much more memory.
+    Teeth of a separable table are stored one by one where their pairs would take much more memory.
     """
-    if isinstance(table, SlicedTable):
-        kinds = table.pinion_kind, table.wheel_kind
-        present = table.pinion_present[kinds[0]], table.wheel_present[kinds[1]]
-    else:
-        kinds = table.pinion.kind, table.wheel.kind
-        present = table.pinion.present[kinds[0]], table.wheel.present[kinds[1]]
-    pinion_kinds, pinion_row = np.unique(kinds[0], return_inverse=True)
-    wheel_kinds, wheel_row = np.unique(kinds[1], return_inverse=True)
+    gears = table.pinion, table.wheel
+    is_there = np.concatenate([teeth.present[teeth.kind] for teeth in gears])
+    pinion_kinds, pinion_row = np.unique(table.pinion.kind, return_inverse=True)
+    wheel_kinds, wheel_row = np.unique(table.wheel.kind, return_inverse=True)
     n_kinds = len(pinion_kinds), len(wheel_kinds)
     are_many = math.prod(n_kinds) > MOST_PAIRS * sum(n_kinds)
-    if isinstance(table, PairTable) and are_many:
-        return _teeth_one_by_one(table, np.concatenate(present))
+    if table.is_separable and are_many:
+        return _teeth_one_by_one(table, is_there)
     pinion = np.repeat(pinion_kinds, len(wheel_kinds))
     wheel = np.tile(wheel_kinds, len(pinion_kinds))
     if pinion[0] != 0 or wheel[0] != 0:  # back flanks are those of healthy teeth
         pinion, wheel = np.append(0, pinion), np.append(0, wheel)
         wheel_row = wheel_row + 1
-    if isinstance(table, SlicedTable):
-        columns = _sliced_columns(table)
-        values = np.stack([column[pinion, wheel] for column in columns], axis=-1)
-    else:
-        sides = zip(_columns(table.pinion), _columns(table.wheel), strict=True)
-        values = np.empty((len(pinion), 1, len(table.position), COLUMNS))
-        for column, (of_pinion, of_wheel) in enumerate(sides):
-            for row, (p, w) in enumerate(zip(pinion, wheel, strict=True)):
-                np.add(of_pinion[p], of_wheel[w], out=values[row, 0, :, column])
+    columns = list(table.pairs)
+    if not table.is_separable:
+        columns.extend(_chord_columns(table))
     rows = np.concatenate([pinion_row, wheel_row])
     return ToothRows(
-        values=values,
-        row=np.where(np.concatenate(present), rows, -1),
+        values=np.stack([column[pinion, wheel] for column in columns], axis=-1),
+        row=np.where(is_there, rows, -1),
         pinion_stride=len(wheel_kinds),
         wheel_first=0,
     )
 
 
-def _teeth_one_by_one(table: PairTable, present: NDArray[np.bool_]) -> ToothRows:
-    """Rows of the distinct teeth of both gears; ``present`` (tooth,)."""
-    sides = table.pinion, table.wheel
-    values = np.concatenate([np.stack(_columns(side), axis=-1) for side in sides])
-    kinds = np.concatenate([side.kind for side in sides])
+def _teeth_one_by_one(table: ToothTable, is_there: NDArray[np.bool_]) -> ToothRows:
+    """Rows of the distinct teeth of both gears; ``is_there`` (tooth,)."""
+    kinds = [table.pinion.kind, table.wheel.kind]
+    rows = [
+        np.stack(part, axis=-1).reshape(-1, *part.gap.shape[2:], COLUMNS)
+        for part in table.parts
+    ]
     return ToothRows(
-        values=values[:, None],
-        row=np.where(present, kinds, -1),
+        values=np.concatenate(rows),
+        row=np.where(is_there, np.concatenate(kinds), -1),
         pinion_stride=1,
-        wheel_first=len(table.pinion.compliance),
+        wheel_first=len(rows[0]),
     )
 
 
-def _columns(side: GearTable) -> tuple[Array, ...]:
-    """Table columns c, c', g, g', (distinct, node) each."""
-    return side.compliance, side.compliance_slope, side.gap, side.gap_slope
-
-
-def _sliced_columns(table: SlicedTable) -> list[Array]:
-    """Columns of ``Group.table`` and ``Group.chord_table``, (pinion, wheel, chord, node) each."""
-    touch = table.gap[:, :, :1], table.gap_slope[:, :, :1]
+def _chord_columns(table: ToothTable) -> list[Array]:
+    """Columns of ``Group.chord_table``, (pinion kind, wheel kind, chord, node) each."""
+    _, _, gap, gap_slope = table.pairs
+    touch = gap[:, :, :1], gap_slope[:, :, :1]
     return [
-        table.compliance,
-        table.compliance_slope,
-        table.gap,
-        table.gap_slope,
         *left_out_energy(table),
-        *[np.broadcast_to(values, table.gap.shape) for values in touch],
+        *[np.broadcast_to(values, gap.shape) for values in touch],
     ]

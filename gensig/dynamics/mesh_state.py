@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics._layout import N_SEEN, SEEN_FORCE, SEEN_NEWEST, SEEN_PAIRS
-from gensig.dynamics.helical import half_lag, pitches
+from gensig.dynamics.helical import pitches
 from gensig.dynamics.mesh_teeth import MeshTeeth
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ def mesh_state(
     share = np.divide(forces, total, out=np.zeros_like(forces), where=total > 0.0)
     pinion = (index + teeth.start_teeth[0]) % pair.pinion.n_teeth
     wheel = (index + teeth.start_teeth[1]) % pair.wheel.n_teeth
-    path_end = pair.path_of_contact + 2.0 * half_lag(teeth.table)
+    path_end = pair.path_of_contact + 2.0 * teeth.table.half_lag
     loaded = forces > 0.0
     near = loaded | ((position >= 0.0) & (position <= path_end))
     odd = np.zeros(near.shape, dtype=bool)

@@ -8,17 +8,16 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics.mesh_statics import (
-    loss_arm,
-    mean_mesh_stiffness,
-    static_load,
-    tooth_states,
-)
+from gensig.dynamics.mesh_statics import loss_arm, mean_mesh_stiffness
 from gensig.geometry.contact import GearPair
-from gensig.mesh.load_distribution import Meeting, PairStates, StaticMesh
-from gensig.mesh.pair_table import PairTable
-from gensig.mesh.sliced.sliced_statics import ChordStates
-from gensig.mesh.sliced.sliced_table import SlicedTable
+from gensig.mesh.load_distribution import (
+    Meeting,
+    PairStates,
+    StaticMesh,
+    pair_states,
+    static_mesh,
+)
+from gensig.mesh.tooth_table import ToothTable
 
 Array = NDArray[np.float64]
 # over a turn of the wheel, at which static loads give the mean friction: a prime, so that the rolls
@@ -40,14 +39,14 @@ class MeshTeeth:
     start_phase : pitches that pair 0 is past A at time 0; of helical teeth its first slice
     """
 
-    table: PairTable | SlicedTable
+    table: ToothTable
     errors: OfGears
     tilts: OfGears
     start_teeth: tuple[int, int] = (0, 0)
     start_phase: float = 0.0
 
     @classmethod
-    def perfect(cls, table: PairTable | SlicedTable, **start: Any) -> Self:
+    def perfect(cls, table: ToothTable, **start: Any) -> Self:
         """Teeth without errors, whose tables may have faults."""
         pinion, wheel = (np.zeros(gear.n_teeth) for gear in table.pair.gears.values())
         return cls(table=table, errors=(pinion, wheel), tilts=(pinion, wheel), **start)
@@ -78,13 +77,13 @@ class MeshTeeth:
         lost = (load * loss_arm(self.table, states.position)).sum(axis=1)
         return self.table.options.friction_coefficient * float(np.mean(lost))
 
-    def states(self, roll: Array) -> PairStates | ChordStates:
+    def states(self, roll: Array) -> PairStates:
         """Pairs of teeth at rolls of the pinion in m, (phase,)."""
-        return tooth_states(self.table, roll, self.meeting)
+        return pair_states(self.table, roll, self.meeting)
 
-    def static(self, states: PairStates | ChordStates, force: float) -> StaticMesh:
+    def static(self, states: PairStates, force: float) -> StaticMesh:
         """Equilibrium of pairs of teeth under a normal force in N."""
-        return static_load(self.table, states, force)
+        return static_mesh(self.table, states, force)
 
     @property
     def meeting(self) -> Meeting:

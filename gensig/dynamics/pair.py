@@ -17,8 +17,7 @@ from gensig.dynamics.helical import AXIAL_DOFS, axial_reach, pitches
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.system import LumpedSystem
 from gensig.errors import ConfigError
-from gensig.mesh.pair_table import PairTable
-from gensig.mesh.sliced.sliced_table import SlicedTable
+from gensig.mesh.tooth_table import ToothTable
 from gensig.operation.setpoint import Operating
 from gensig.units import split_unit, unit
 
@@ -159,14 +158,14 @@ class PairDynamics(Dynamics):
                 )
 
     @property
-    def table(self) -> PairTable | SlicedTable:
+    def table(self) -> ToothTable:
         """Tables of the teeth."""
         return self.teeth.table
 
     @property
     def is_helical(self) -> bool:
         """True if the gears move along their axes and tilt."""
-        return isinstance(self.table, SlicedTable)
+        return not self.table.is_separable
 
     @property
     def gear_dofs(self) -> tuple[str, ...]:

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import Tooth
 from gensig.material import Material
-from gensig.mesh._static_kernels import add_teeth, share_over_pairs
+from gensig.mesh._static_kernels import add_part, share_over_pairs
 from gensig.mesh.modification import PLAIN, PairModification
 from gensig.mesh.options import MeshOptions
-from gensig.mesh.pair_table import N_PAIRS, PairTable, pair_table
+from gensig.mesh.pair_table import pair_table
+from gensig.mesh.tooth_table import GearTeeth, ToothTable
 
 Array = NDArray[np.float64]
 
@@ -25,10 +26,10 @@ LEAST_LOAD_SHARE = 0.02  # local compliance has no limit as the load falls to 0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairStates:
-    """Compliance (less the shared part), gap and position of the tooth pairs, (phase, pair).
+    """Chords of the tooth pairs at each phase, in order of entry.
 
-    Pairs are in order of entry, the pair that approaches A first. An absent pair has an infinite
-    gap.
+    ``compliance`` less the shared part and ``gap`` are (phase, pair, chord), ``position`` (phase,
+    pair) m. An absent pair has infinite gaps.
     """
 
     compliance: Array
@@ -80,45 +81,48 @@ PERFECT = Meeting()
 
 
 def pair_states(
-    table: PairTable, roll: Array, meeting: Meeting = PERFECT
+    table: ToothTable, roll: Array, meeting: Meeting = PERFECT
 ) -> PairStates:
-    """Pairs at the pinion's roll, (phase,) m along the line of action."""
+    """Pairs at the pinion's roll, (phase,) m along the line of action.
+
+    Errors and tilts of the teeth are those of the middle of the face.
+    """
     pitch = table.pair.base_pitch
-    newest = np.floor(roll / pitch).astype(np.int64)
-    index = newest[:, None] + 1 - np.arange(N_PAIRS)
+    newest = np.floor(roll / pitch).astype(np.int64) - table.first_pitch
+    index = newest[:, None] - np.arange(table.n_pairs)
     position = roll[:, None] - index * pitch
-    cell, part = cells(table.position, position)
-    beyond = position - table.pair.pitch_point
-    compliance = np.full(position.shape, -table.shared_compliance)
-    gap = np.zeros(position.shape)
-    sides = table.pinion, table.wheel
-    teeth = zip(sides, meeting.start_teeth, meeting.errors, meeting.tilts, strict=True)
-    for side, start, error, tilt in teeth:
-        n_teeth = len(side.kind)
-        add_teeth(
-            index + start,
-            cell,
-            part,
-            beyond,
-            side.kind,
-            side.present,
-            side.compliance,
-            side.gap,
-            _of_teeth(error, n_teeth),
-            _of_teeth(tilt, n_teeth),
-            compliance,
-            gap,
+    cell, share = cells(table.position, position)
+    beyond = position - table.pair.pitch_point - table.half_lag
+    kinds, back = [], np.zeros(position.shape)
+    gears = zip(
+        (table.pinion, table.wheel),
+        meeting.start_teeth,
+        meeting.errors,
+        meeting.tilts,
+        strict=True,
+    )
+    for teeth, start, errors, tilts in gears:
+        tooth = (index + start) % len(teeth.kind)
+        kinds.append(teeth.kind[tooth])
+        back += (
+            _of_teeth(errors, teeth)[tooth] + _of_teeth(tilts, teeth)[tooth] * beyond
         )
+    back[~table.present[kinds[0], kinds[1]]] = np.inf
+    shape = *position.shape, len(table.depth)
+    compliance = np.full(shape, -table.shared_compliance)
+    gap = np.broadcast_to(back[:, :, None], shape).copy()
+    for part in table.parts:
+        add_part(part.compliance, part.gap, *kinds, cell, share, compliance, gap)
     return PairStates(compliance=compliance, gap=gap, position=position)
 
 
-def _of_teeth(values: Array | None, n_teeth: int) -> Array:
+def _of_teeth(values: Array | None, teeth: GearTeeth) -> Array:
     """Values of a gear's teeth, (tooth,); 0 for None, ValueError for another number of teeth."""
-    nothing = np.zeros(n_teeth)
+    nothing = np.zeros(len(teeth.kind))
     return nothing if values is None else nothing + values
 
 
-def static_mesh(table: PairTable, states: PairStates, force: float) -> StaticMesh:
+def static_mesh(table: ToothTable, states: PairStates, force: float) -> StaticMesh:
     """Load sharing, approach and tangent stiffness dF/d(approach) under a total mesh force in N.
 
     ``mesh.law=paper`` has no gaps: pairs on the path share by stiffness, and where none is on it
@@ -126,13 +130,13 @@ def static_mesh(table: PairTable, states: PairStates, force: float) -> StaticMes
     """
     gap = states.gap
     if table.options.law == "paper":
-        end = table.pair.path_of_contact
+        end = table.pair.path_of_contact + 2.0 * table.half_lag
         on_path = (states.position >= 0.0) & (states.position <= end)
-        gap = np.where(on_path & np.isfinite(gap), 0.0, np.inf)
+        gap = np.where(on_path[:, :, None] & np.isfinite(gap), 0.0, np.inf)
     n_phases = len(gap)
-    approach, load = np.empty(n_phases), np.empty_like(gap)
+    approach, load = np.empty(n_phases), np.empty(gap.shape[:2])
     stiffness = np.empty(n_phases)
-    given = states.compliance, gap, force, table.shared_compliance
+    given = states.compliance, gap, table.depth, force, table.shared_compliance
     share_over_pairs(*given, approach, load, stiffness)
     return StaticMesh(approach=approach, load=load, stiffness=stiffness)
 
@@ -145,7 +149,7 @@ def loaded_pair_table(
     *,
     force: float,
     modification: PairModification = PLAIN,
-) -> PairTable:
+) -> ToothTable:
     """Table for a total force in N: its contact term is the secant at the load of healthy pairs."""
     load: Array | float = force
     if options.contact != "linear":
@@ -180,16 +184,17 @@ def sound_load(
     return loads
 
 
-def _sound_states(table: PairTable) -> PairStates:
+def _sound_states(table: ToothTable) -> PairStates:
     """Healthy tooth pairs at every node of one pitch, in order of entry."""
+    per_pitch = table.options.points_per_pitch
 
     def of_pairs(nodes: Array) -> Array:
-        by_pair = nodes[:-1].reshape(N_PAIRS, table.options.points_per_pitch)
+        by_pair = nodes[:-1].reshape(table.n_pairs, per_pitch)
         return np.ascontiguousarray(by_pair.T)
 
-    both = table.pinion.compliance[0] + table.wheel.compliance[0]
+    compliance, _, gap, _ = (column[0, 0, 0] for column in table.pairs)
     return PairStates(
-        compliance=of_pairs(both - table.shared_compliance),
-        gap=of_pairs(table.pinion.gap[0] + table.wheel.gap[0]),
+        compliance=of_pairs(compliance - table.shared_compliance)[:, :, None],
+        gap=of_pairs(gap)[:, :, None],
         position=of_pairs(table.position),
     )

@@ -1,4 +1,4 @@
-"""Mesh table of a spur pair: compliance and gap of every distinct tooth by contact position."""
+"""Table of spur teeth: what every distinct tooth of a gear adds, by contact position."""
 
 from __future__ import annotations
 
@@ -30,6 +30,7 @@ from gensig.mesh.modification import PLAIN, PairModification, sound_teeth
 from gensig.mesh.options import MeshOptions
 from gensig.mesh.root_crack import crack_compliance
 from gensig.mesh.smooth_table import smooth
+from gensig.mesh.tooth_table import GearTeeth, TablePart, ToothTable
 
 Array = NDArray[np.float64]
 
@@ -39,39 +40,11 @@ FIRST_PITCH, LAST_PITCH = -1, 3
 # larger second differences of compliances, as a share, and of gaps in m are steps and kinks of
 # the flank
 SMOOTHED_SHARE, SMOOTHED_GAP = 0.01, 1e-7
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GearTable:
-    """One gear's side of the mesh: one row per distinct tooth; ``kind`` (tooth,) is a tooth's row.
-
-    ``compliance`` and ``gap`` are (distinct, node), m/N and m, each with its slope over position.
-    Between nodes slopes are linear and values are their integral.
-    """
-
-    compliance: Array
-    compliance_slope: Array
-    gap: Array
-    gap_slope: Array
-    present: NDArray[np.bool_]
-    kind: NDArray[np.int64]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PairTable:
-    """Both gears' tables on the node positions s of -1 to 3 base pitches.
-
-    The contact term of healthy flanks is on the pinion's side. Each side adds what its faults cost
-    against a sound mate. ``shared_compliance`` is the body compliance that all tooth pairs in
-    contact share.
-    """
-
-    pair: GearPair
-    options: MeshOptions
-    position: Array
-    pinion: GearTable
-    wheel: GearTable
-    shared_compliance: float
+# (kind, node) of one gear as (pinion kind, wheel kind, chord, node)
+_KINDS = {
+    "pinion": (slice(None), None, None, slice(None)),
+    "wheel": (None, slice(None), None, slice(None)),
+}
 
 
 def node_positions(pair: GearPair, options: MeshOptions) -> Array:
@@ -88,8 +61,11 @@ def pair_table(
     *,
     load: Array | float,
     modification: PairModification = PLAIN,
-) -> PairTable:
-    """Tabulate the mesh of a gear pair.
+) -> ToothTable:
+    """Tabulate the spur teeth of a gear pair on the positions of -1 to 3 base pitches.
+
+    The contact term of healthy flanks is on the pinion's side. Each side adds what its faults cost
+    against a sound mate.
 
     Parameters
     ----------
@@ -99,22 +75,26 @@ def pair_table(
     """
     sound = _sound_mesh(pair, material, options)
     sound_tooth = sound_teeth(pair, modification)
-    tables = {
-        side: _gear_table(sound, side, sound_tooth[side], teeth or {}, load)
-        for side in SIDES
-    }
+    (pinion, of_pinion), (wheel, of_wheel) = (
+        _gear_table(sound, side, sound_tooth[side], teeth or {}, load) for side in SIDES
+    )
     shared = sound.shared_compliance
-    stiffest = float(sum(table.compliance.min() for table in tables.values()))
+    stiffest = float(of_pinion.compliance.min() + of_wheel.compliance.min())
     if shared >= 0.95 * stiffest:
         raise ExtrapolationError(
             f"the gear bodies share {shared:.3g} m/N of the stiffest pair's {stiffest:.3g} m/N, "
             f"more than one pair has; use a larger bore_radius_mm or mesh.pair_coupling=sum"
         )
-    return PairTable(
+    return ToothTable(
         pair=pair,
         options=options,
         position=sound.position,
-        **tables,
+        first_pitch=FIRST_PITCH,
+        last_pitch=LAST_PITCH,
+        depth=np.zeros(1),
+        pinion=pinion,
+        wheel=wheel,
+        parts=(of_pinion, of_wheel),
         shared_compliance=shared,
     )
 
@@ -364,10 +344,10 @@ def _gear_table(
     sound_tooth: Tooth,
     teeth: Mapping[tuple[str, int], Tooth],
     load: Array | float,
-) -> GearTable:
-    """Rows of the distinct teeth.
+) -> tuple[GearTeeth, TablePart]:
+    """Kinds of one gear's teeth, and what they add to a pair with any mate.
 
-    Teeth that are one object share a row, equal structures are computed once.
+    Teeth that are one object are one kind, equal structures are computed once.
     """
     flank, options = sound.flanks[side].with_load(load), sound.options
     distinct, kind = distinct_teeth(sound_tooth, teeth)
@@ -388,14 +368,15 @@ def _gear_table(
     limit = SMOOTHED_SHARE * float(compliance[0].min())
     compliance, compliance_slope = smooth(compliance, distance, limit)
     gap, gap_slope = smooth(gap, distance, SMOOTHED_GAP)
-    return GearTable(
-        compliance=compliance,
-        compliance_slope=compliance_slope,
-        gap=gap,
-        gap_slope=gap_slope,
-        present=np.array([tooth.present for tooth in distinct]),
-        kind=kind,
+    kinds = _KINDS[side]
+    part = TablePart(
+        compliance=compliance[kinds],
+        compliance_slope=compliance_slope[kinds],
+        gap=gap[kinds],
+        gap_slope=gap_slope[kinds],
     )
+    present = np.array([tooth.present for tooth in distinct])
+    return GearTeeth(kind=kind, present=present), part
 
 
 def distinct_teeth(

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.helical import pitches
-from gensig.dynamics.mesh_statics import static_load, tooth_states
 from gensig.faults.base import Fault
 from gensig.faults.broken import MissingTooth
+from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.systems.base import Machine
 
 Array = NDArray[np.float64]
@@ -41,15 +41,12 @@ def tooth_reach(machine: Machine, gear: str) -> float:
     missing = MissingTooth(gear=side, tooth=0)
     sound, without = at.mesh_table(), at.mesh_table((missing,))
     roll = _passage(at)
-    place, present = tooth_states(without, roll), tooth_states(sound, roll)
-    approach = static_load(without, place, at.mesh_force).approach
+    place, present = pair_states(without, roll), pair_states(sound, roll)
+    approach = static_mesh(without, place, at.mesh_force).approach
     local = approach - sound.shared_compliance * at.mesh_force
-    gaps = [
-        states.gap.reshape(*states.position.shape, -1)[..., 0]
-        for states in (place, present)
-    ]
-    is_gone = np.isinf(gaps[0]) & np.isfinite(gaps[1])
-    inside = np.where(is_gone, local[:, None] - gaps[1], -np.inf)
+    open_, closed = place.gap[:, :, 0], present.gap[:, :, 0]
+    is_gone = np.isinf(open_) & np.isfinite(closed)
+    inside = np.where(is_gone, local[:, None] - closed, -np.inf)
     return max(float(inside.max()), 0.0)
 
 
@@ -75,8 +72,8 @@ def passage_approach(
             replace(fault, gear=side, tooth=_from(fault.tooth, first)) for fault in own
         )
         table = at.mesh_table(moved)
-        states = tooth_states(table, _passage(at))
-        approaches.append(static_load(table, states, at.mesh_force).approach)
+        states = pair_states(table, _passage(at))
+        approaches.append(static_mesh(table, states, at.mesh_force).approach)
     return approaches
 
 

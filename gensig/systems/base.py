@@ -22,8 +22,7 @@ from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.options import MeshOptions
-from gensig.mesh.pair_table import PairTable
-from gensig.mesh.sliced.sliced_table import SlicedTable
+from gensig.mesh.tooth_table import ToothTable
 from gensig.operation.setpoint import Operating
 from gensig.sensing.chain import Sensing
 from gensig.sensing.encoder import Disc
@@ -203,7 +202,7 @@ class Machine(ABC):
         """
 
     @abstractmethod
-    def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable | SlicedTable:
+    def mesh_table(self, faults: Sequence[Fault] = ()) -> ToothTable:
         """Tables of the followed mesh with the given faults."""
 
     @abstractmethod
@@ -295,7 +294,7 @@ def specimen_table(
     machine: Machine,
     faults: Sequence[Fault],
     specimen: Specimen,
-) -> PairTable | SlicedTable:
+) -> ToothTable:
     """Mesh table of a specimen's gears with faults, at the specimen's backlash.
 
     Sound tables are shared: the backlash is set afterwards.

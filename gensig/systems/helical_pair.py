@@ -11,7 +11,7 @@ from gensig.dynamics.helical import AXIAL_DOFS
 from gensig.dynamics.pair import PAIR_DOFS
 from gensig.errors import ConfigError, GeometryError
 from gensig.faults.base import Fault
-from gensig.mesh.sliced.sliced_table import SlicedTable
+from gensig.mesh.tooth_table import ToothTable
 from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.stiffness_curves import StiffnessCurves
@@ -38,7 +38,7 @@ class HelicalPair(GearPairMachine):
         """Motions of both gears, also along their axes, and tilts."""
         return (*PAIR_DOFS, *AXIAL_DOFS)
 
-    def mesh_table(self, faults: Sequence[Fault] = ()) -> SlicedTable:
+    def mesh_table(self, faults: Sequence[Fault] = ()) -> ToothTable:
         """Force over phase and approach of every distinct pair of teeth, with the given faults."""
         return self.flanks.mesh_table(faults)
 

@@ -23,7 +23,7 @@ from gensig.mesh.sliced.component_sum import (
     component_pair_stiffness,
 )
 from gensig.mesh.sliced.slice_pressure import contact_pressure
-from gensig.mesh.sliced.sliced_table import SlicedTable, sliced_table
+from gensig.mesh.sliced.sliced_table import sliced_table
 from gensig.mesh.sliced.slices import (
     LoadedContact,
     SlicedMesh,
@@ -34,6 +34,7 @@ from gensig.mesh.sliced.slices import (
 )
 from gensig.mesh.thermal.paper_growth import PaperGrowth
 from gensig.mesh.thermal.thermal_growth import PairGrowth
+from gensig.mesh.tooth_table import ToothTable
 
 Array = NDArray[np.float64]
 
@@ -122,7 +123,7 @@ class SlicedPair:
             back = back + self.growth.deviation(self.pair, position)
         return back
 
-    def mesh_table(self, faults: Sequence[Fault] = ()) -> SlicedTable:
+    def mesh_table(self, faults: Sequence[Fault] = ()) -> ToothTable:
         """Chord table of the mesh with the given faults."""
         return _mesh_table(self, tuple(faults))
 
@@ -245,7 +246,7 @@ def _seen(mesh: SlicedMesh) -> tuple[int, int, Meeting, tuple[int, int] | None]:
 
 
 @lru_cache(maxsize=32)
-def _mesh_table(system: SlicedPair, faults: tuple[Fault, ...]) -> SlicedTable:
+def _mesh_table(system: SlicedPair, faults: tuple[Fault, ...]) -> ToothTable:
     return sliced_table(
         system.pair,
         system.material,

@@ -24,7 +24,8 @@ from gensig.mesh.modification import (
     sound_teeth,
 )
 from gensig.mesh.options import MeshOptions, SliceOptions
-from gensig.mesh.pair_table import N_PAIRS, PairTable
+from gensig.mesh.pair_table import N_PAIRS
+from gensig.mesh.tooth_table import ToothTable
 from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.stiffness_curves import (
@@ -79,7 +80,7 @@ class SpurPair(GearPairMachine):
         """Raise GeometryError unless at least one pair of teeth is always in contact."""
         self.pair.require_continuous_drive()
 
-    def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable:
+    def mesh_table(self, faults: Sequence[Fault] = ()) -> ToothTable:
         """Compliance and gap tables with the given faults."""
         machine = self.pair, self.material, self.mesh
         return _mesh_table(*machine, tuple(faults), self.mesh_force, self.modification)
@@ -151,7 +152,7 @@ def _mesh_table(
     faults: tuple[Fault, ...],
     force: float,
     modification: PairModification,
-) -> PairTable:
+) -> ToothTable:
     teeth = faulty_teeth(pair, faults, sound_teeth(pair, modification))
     return loaded_pair_table(
         pair, material, mesh, teeth, force=force, modification=modification

@@ -16,11 +16,11 @@ from gensig.material import Material
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.options import MeshOptions
 from gensig.mesh.pair_table import (
-    PairTable,
     flank_sides,
     slice_bending,
     structural_terms,
 )
+from gensig.mesh.tooth_table import ToothTable
 
 Array = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ class SinglePair:
 
 def stiffness_curves(
     machine: LoadedMesh,
-    table: PairTable,
+    table: ToothTable,
     faults: Sequence[Fault],
     whole: Mapping[str, Tooth],
     *,

@@ -8,6 +8,7 @@ import pytest
 import yaml
 from examples import fault_example
 from examples.fault_example import Notch
+from fault_cases import side_of
 from numpy.testing import assert_allclose, assert_array_equal
 
 from gensig.errors import ConfigError, FaultError
@@ -66,7 +67,7 @@ def test_the_mesh_has_a_gap_over_the_groove_and_nowhere_else(xiamen):
     table = xiamen.mesh_table([notch(tooth=3)])
     assert_array_equal(np.flatnonzero(table.pinion.kind), [3])
     assert not table.wheel.kind.any()
-    gap = table.pinion.gap[1] - table.pinion.gap[0]
+    gap = side_of(table, "pinion").gap[1] - side_of(table, "pinion").gap[0]
     pitch_point = xiamen.pair.pitch_point
     assert 1e-6 < np.interp(pitch_point, table.position, gap) < 0.1e-3
     assert not gap[np.abs(table.position - pitch_point) > 2e-3].any()

@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closeness import assert_close
-from fault_cases import one
+from fault_cases import one, side_of
 from numpy.testing import assert_array_equal
 
 from gensig.dynamics.lanes import tooth_rows
 from gensig.errors import GeometryError
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.modification import PLAIN, FlankModification, PairModification
-from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
 from gensig.systems.base import simulate_together
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run
@@ -42,7 +41,7 @@ def ripple(system, faults=()):
 
 def columns(table):
     return [
-        getattr(getattr(table, side), name)
+        getattr(side_of(table, side), name)
         for side in SIDES
         for name in ("compliance", "gap", "gap_slope")
     ]
@@ -92,8 +91,8 @@ def test_the_gaps_are_those_of_the_fault_of_the_same_relief(xiamen, shape):
     mine = system.mesh_table()
     theirs = xiamen.mesh_table(faults)
     for name in SIDES:
-        relieved_side = getattr(mine, name)
-        fault = getattr(theirs, name)
+        relieved_side = side_of(mine, name)
+        fault = side_of(theirs, name)
         assert set(relieved_side.kind) == {0}
         assert relieved_side.gap[0].max() > 0.9 * depth
         assert_close(
@@ -107,23 +106,15 @@ def test_back_flanks_are_modified_too(xiamen):
     system = relieved(xiamen, tip_relief=10 * UM, tip_relief_height=0.6 * MM)
     table = system.mesh_table((one("crack", gear="pinion", tooth=3),))
     rows = tooth_rows(table).values[:, 0]
-    assert_array_equal(rows[0, :, 2], table.pinion.gap[0] + table.wheel.gap[0])
+    assert_array_equal(rows[0, :, 2], table.pairs.gap[0, 0, 0])
     assert rows[0, :, 2].max() > 9 * UM
 
 
 def test_a_fault_comes_on_top(xiamen):
     """A pitch error adds itself to the relief."""
     system = relieved(xiamen, tip_relief=10 * UM, tip_relief_height=0.6 * MM)
-    side = system.mesh_table(
-        (
-            one(
-                "pitch_error",
-                gear="wheel",
-                tooth=5,
-                pitch_error_um=7,
-            ),
-        )
-    ).wheel
+    late = one("pitch_error", gear="wheel", tooth=5, pitch_error_um=7)
+    side = side_of(system.mesh_table((late,)), "wheel")
     assert_close(
         side.gap[side.kind[5]],
         side.gap[0] + 7 * UM,
@@ -193,8 +184,8 @@ def test_leads_are_those_of_the_sliced_pair(config_with, lead, share):
     spur_approach = static_mesh(
         table, pair_states(table, roll), spur.mesh_force
     ).approach.mean()
-    theirs = chord_equilibrium(
-        slices, chord_states(slices, roll), spur.mesh_force
+    theirs = static_mesh(
+        slices, pair_states(slices, roll), spur.mesh_force
     ).approach.mean()
 
     assert_close(spur_approach, theirs, share)

@@ -175,7 +175,10 @@ def lost_at_pitch_point(system, fault):
     """Share of the single pair's stiffness at C that a fault costs, gaps left out."""
 
     def compliance(table, kind):
-        gears = (table.pinion.compliance[kind], table.wheel.compliance[0])
+        gears = (
+            side_of(table, "pinion").compliance[kind],
+            side_of(table, "wheel").compliance[0],
+        )
         return sum(
             np.interp(system.pair.pitch_point, table.position, of_gear)
             for of_gear in gears

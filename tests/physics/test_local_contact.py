@@ -135,7 +135,7 @@ def test_load_sharing_and_compliance_agree(physical):
     )
     at = states.position[inside]
     width = physical.pair.pinion.face_width
-    of_pairs = states.compliance[inside] + table.shared_compliance
+    of_pairs = states.compliance[inside, 0] + table.shared_compliance
     law = weber_contact(physical.pair, at, physical.material)
     contact = law.compliance(width, load[inside])
     full = law.compliance(width, force)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gensig.dynamics.mesh_statics import static_load, tooth_states
+from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 
@@ -16,7 +16,7 @@ def at_rest(*words, torque=20.0):
     machine = read_machine(config)
     table, force = machine.mesh_table(), machine.mesh_force
     roll = table.pair.base_pitch * (np.arange(64) + 0.5) / 64
-    result = static_load(table, tooth_states(table, roll), force)
+    result = static_mesh(table, pair_states(table, roll), force)
     return result.approach, result.stiffness, force
 
 

@@ -5,7 +5,7 @@ faulty tooth shows.
 import numpy as np
 import pytest
 from closeness import assert_close
-from fault_cases import GEARS, KINDS, one
+from fault_cases import GEARS, KINDS, one, side_of
 
 from gensig.mesh.load_distribution import Meeting, PairStates, pair_states, static_mesh
 
@@ -41,7 +41,11 @@ def random_states(table, n=400):
     gap[rng.random(size) < 0.5] = 0.0
     gap[rng.random(size) < 0.2] = np.inf
     gap[np.isinf(gap).all(axis=1), 0] = 1e-6
-    return PairStates(compliance=compliance, gap=gap, position=np.zeros(size))
+    return PairStates(
+        compliance=compliance[:, :, None],
+        gap=gap[:, :, None],
+        position=np.zeros(size),
+    )
 
 
 def violation(states, static, shared, force):
@@ -52,8 +56,9 @@ def violation(states, static, shared, force):
     everywhere.
     """
     load = static.load
-    deflection = states.compliance * load + shared * load.sum(axis=1, keepdims=True)
-    slack = states.gap + deflection - static.approach[:, None]
+    own = states.compliance[:, :, 0] * load
+    deflection = own + shared * load.sum(axis=1, keepdims=True)
+    slack = states.gap[:, :, 0] + deflection - static.approach[:, None]
     slack = slack / static.approach.max()
     carrying = load > 0
     breaches = [
@@ -86,7 +91,7 @@ class TestPairStates:
             position = roll - number * pitch
             compliance, gap = -table.shared_compliance, 0.0
             for side in GEARS:
-                teeth = getattr(table, side)
+                teeth = side_of(table, side)
                 tooth = (number + starts[side]) % len(teeth.kind)
                 row = teeth.kind[tooth]
                 nodes = position, table.position
@@ -117,7 +122,7 @@ class TestPairStates:
         expected = np.array([list(self.plain(table, r, starts, errors)) for r in roll])
         rows = (expected[:, :, 0], 1e-9, 0.0), (expected[:, :, 1], 1e-9, 1e-15)
         for result, (values, rtol, atol) in zip(
-            (states.compliance, states.gap), rows, strict=True
+            (states.compliance[:, :, 0], states.gap[:, :, 0]), rows, strict=True
         ):
             assert_close(result, values, rtol, atol=atol)
         assert_close(states.position, expected[:, :, 2], atol=1e-12)
@@ -140,7 +145,7 @@ def test_without_a_pair_nothing_is_carried(table):
     states = random_states(table)
     states.gap[::3] = np.inf
     static = static_mesh(table, states, 925.0)
-    lost = np.isinf(states.gap).all(axis=1)
+    lost = np.isinf(states.gap).all(axis=(1, 2))
     assert lost.any()
     assert not lost.all()
     assert (static.approach[lost] == np.inf).all()

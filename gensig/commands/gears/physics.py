@@ -13,7 +13,6 @@ from gensig.commands.figures.machine_figures import plot_stiffness
 from gensig.commands.output import check_outputs, highest, span, write_outputs
 from gensig.commands.request import read_configuration
 from gensig.faults.registry import read_faults
-from gensig.mesh.pair_table import PairTable
 from gensig.record.machines import read_machine
 from gensig.systems.base import Machine
 from gensig.systems.registry import SLICED, PairParts
@@ -58,7 +57,6 @@ def stiffness(arguments: Namespace) -> int:
 def stiffness_content(system: Machine, curves: StiffnessCurves) -> dict[str, Any]:
     """The keys of ``gensig stiffness --json``."""
     table = system.mesh_table()
-    assert isinstance(table, PairTable)  # which the curves are made of
     ratio, is_paper = system.pair.transverse_contact_ratio, system.mesh.law == "paper"
     content: dict[str, Any] = {
         "transverse_contact_ratio": ratio,

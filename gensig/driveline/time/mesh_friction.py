@@ -11,9 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics.helical import half_lag
-from gensig.mesh.pair_table import PairTable
-from gensig.mesh.sliced.sliced_table import SlicedTable
+from gensig.mesh.tooth_table import ToothTable
 
 Array = NDArray[np.float64]
 
@@ -34,7 +32,7 @@ class MeshFriction:
 
 
 def mesh_friction(
-    table: PairTable | SlicedTable,
+    table: ToothTable,
     direction: Array,
     touched: Sequence[int],
     rotation: Array,
@@ -50,7 +48,7 @@ def mesh_friction(
     sense : 1 where gear a turns from x to y, else -1
     """
     options, pair = table.options, table.pair
-    lag, (*_, turn_a, _, _, turn_b) = half_lag(table), touched
+    lag, (*_, turn_a, _, _, turn_b) = table.half_lag, touched
     directions = np.zeros((3, len(direction)))
     directions[0] = slide_direction(direction, touched, sense)
     # an angle that counts against its rotation feels moments the other way

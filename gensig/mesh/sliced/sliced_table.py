@@ -1,8 +1,6 @@
-"""Mesh table of a helical pair: force over (phase, approach) of every distinct tooth pair.
+"""Table of teeth in slices: chords of the force of every distinct pair over its approach.
 
-The force of a sliced tooth pair is convex in the approach: with more depth more slices bear. The
-table keeps it as chords between fixed depths. Each chord is a compliance and a gap like those of
-a spur pair, so that both have one mesh law.
+The force of a sliced tooth pair is convex in the approach: with more depth more slices bear.
 """
 
 from __future__ import annotations
@@ -39,6 +37,7 @@ from gensig.mesh.sliced.slices import (
 )
 from gensig.mesh.smooth_table import smooth
 from gensig.mesh.thermal.paper_growth import PaperGrowth
+from gensig.mesh.tooth_table import GearTeeth, TablePart, ToothTable
 
 Array = NDArray[np.float64]
 
@@ -55,52 +54,6 @@ FARTHEST = 1e-3  # m; cap of first gaps
 N_PHASES = 32
 MOST_PAIRS = 400  # distinct tooth pairs, about a tenth of a second and 0.8 MB each
 OFF_PATH = 1e3  # times the least compliance, where mesh.law=paper has no contact
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SlicedTable:
-    """Chords of the force of single tooth pairs at positions s of the slice that enters first.
-
-    Chord l of a single loaded pair is force = (approach - gap[l]) / compliance[l]. With other
-    pairs in contact, as for spur pairs, force = (local - gap[l]) / (compliance[l] -
-    shared_compliance), where local = approach - shared_compliance x total force. Chord l holds
-    where local - gap[0] lies between depth[l] and depth[l + 1], the last chord also beyond.
-    gap[0] is the first touch. Neighbouring chords meet at their common depth. As the force is
-    convex, it is the largest of all chords.
-
-    Parameters
-    ----------
-    position : (node,) m      ``points_per_pitch`` to a base pitch, from ``first_pitch`` on
-    first_pitch, last_pitch : whole base pitches; their difference is the pairs at once
-    depth : (chord,) m        beginning with 0
-    compliance, compliance_slope, gap, gap_slope : (pinion kind, wheel kind, chord, node)
-        m/N, 1/N, m, 1
-    pinion_kind, wheel_kind : (tooth,)    kind of every tooth; 0 is healthy
-    pinion_present, wheel_present : (kind,)
-    shared_compliance : m/N   body compliance that all pairs share
-    set_chord : chord of the mean load at the set torque, for uses that need one spring
-    middle_lag : m            position of the first slice less that of the middle of the face;
-        quantities that grow with the contact's position (tilts of single teeth, sliding) grow
-        with position - middle_lag
-    """
-
-    pair: GearPair
-    options: MeshOptions
-    position: Array
-    first_pitch: int
-    last_pitch: int
-    depth: Array
-    compliance: Array
-    compliance_slope: Array
-    gap: Array
-    gap_slope: Array
-    pinion_kind: NDArray[np.int64]
-    wheel_kind: NDArray[np.int64]
-    pinion_present: NDArray[np.bool_]
-    wheel_present: NDArray[np.bool_]
-    shared_compliance: float
-    set_chord: int
-    middle_lag: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +81,7 @@ class _Setting:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Frame:
-    """Depths (knot,) m without 0, positions (node,) m, largest gap m; see `SlicedTable`."""
+    """Depths (knot,) m without 0, positions (node,) m, largest gap m; see `ToothTable`."""
 
     depth: Array
     position: Array
@@ -148,7 +101,7 @@ def sliced_table(
     force: float,
     deviation: Array | None = None,
     hot_teeth: PaperGrowth | None = None,
-) -> SlicedTable:
+) -> ToothTable:
     """Tabulate the mesh of a pair cut into slices.
 
     Parameters
@@ -185,29 +138,27 @@ def sliced_table(
     frame = _frame(setting)
     first, loads = _all_curves(setting, pinion, wheel, pinion_kind, wheel_kind)
     compliance, gap = _chords(first, loads, frame.depth)
-    mesh = _mesh(setting, setting.pinion, setting.wheel)
-    shared = mesh.shared_compliance
+    shared = _mesh(setting, setting.pinion, setting.wheel).shared_compliance
     distance = float(frame.position[1] - frame.position[0])
     columns = _smoothed(compliance + shared, gap, distance)
-    return SlicedTable(
+    return ToothTable(
         pair=pair,
         options=options,
         position=frame.position,
         first_pitch=frame.first_pitch,
         last_pitch=frame.last_pitch,
         depth=np.concatenate([[0.0], frame.depth[:-1]]),
-        compliance=columns[0],
-        compliance_slope=columns[1],
-        gap=columns[2],
-        gap_slope=columns[3],
-        pinion_kind=pinion_kind,
-        wheel_kind=wheel_kind,
-        pinion_present=np.array([tooth.present for tooth in pinion]),
-        wheel_present=np.array([tooth.present for tooth in wheel]),
+        pinion=_gear_teeth(pinion, pinion_kind),
+        wheel=_gear_teeth(wheel, wheel_kind),
+        parts=(columns,),
         shared_compliance=shared,
         set_chord=frame.set_chord,
-        middle_lag=0.5 * float(mesh.lag[0] + mesh.lag[-1]),
     )
+
+
+def _gear_teeth(distinct: list[Tooth], kind: NDArray[np.int64]) -> GearTeeth:
+    present = np.array([tooth.present for tooth in distinct])
+    return GearTeeth(kind=kind, present=present)
 
 
 def _all_curves(
@@ -248,8 +199,8 @@ def _chords(first: Array, loads: Array, depth: Array) -> tuple[Array, Array]:
     return np.moveaxis(compliance, 3, 2), np.moveaxis(gap, 3, 2)
 
 
-def _smoothed(compliance: Array, gap: Array, distance: float) -> list[Array]:
-    """Compliance, its slope, gap and its slope, smoothed chord by chord."""
+def _smoothed(compliance: Array, gap: Array, distance: float) -> TablePart:
+    """Compliance and gap with their slopes, smoothed chord by chord."""
     n_nodes, columns = compliance.shape[3], []
     for chord in range(compliance.shape[2]):
         soft = compliance[:, :, chord].reshape(-1, n_nodes)
@@ -260,7 +211,7 @@ def _smoothed(compliance: Array, gap: Array, distance: float) -> list[Array]:
         )
     kinds = compliance.shape[:2]
     stacked = [np.stack(column, axis=1) for column in zip(*columns, strict=True)]
-    return [values.reshape(*kinds, -1, n_nodes) for values in stacked]
+    return TablePart._make(values.reshape(*kinds, -1, n_nodes) for values in stacked)
 
 
 def _digest(*arrays: Array | None) -> bytes:

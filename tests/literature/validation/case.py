@@ -18,7 +18,8 @@ from gensig.faults.registry import read_faults
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
-from gensig.mesh.pair_table import PairTable, pair_table
+from gensig.mesh.pair_table import pair_table
+from gensig.mesh.tooth_table import ToothTable
 from gensig.options.compose import compose
 from gensig.options.configuration import Configuration
 from gensig.systems.registry import read_system
@@ -44,12 +45,12 @@ class Case:
         return self.system.pair
 
     @property
-    def table(self) -> PairTable:
+    def table(self) -> ToothTable:
         """Compliance and gap tables, with the faults."""
         return self.system.mesh_table(self.faults)
 
     @property
-    def whole_load_table(self) -> PairTable:
+    def whole_load_table(self) -> ToothTable:
         """The same where one pair carries the whole load."""
         return _whole_load_table(self)
 
@@ -137,7 +138,7 @@ def _default_machine() -> Configuration:
 
 
 @lru_cache(maxsize=64)
-def _whole_load_table(case: Case) -> PairTable:
+def _whole_load_table(case: Case) -> ToothTable:
     system = case.system
     if system.mesh.contact == "linear":
         return case.table

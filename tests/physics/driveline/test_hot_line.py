@@ -7,8 +7,6 @@ import pytest
 from closeness import assert_close
 
 from gensig.errors import GeometryError
-from gensig.mesh.pair_table import PairTable
-from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 from gensig.systems.hot_pair import Duty, as_configured, hot_state
@@ -77,16 +75,14 @@ def test_hot_flanks_deviate_by_their_growth(box):
     cold, hot = line(f"system={box}"), line(f"system={box}", HOT, *words)
     growth = hot.heat[hot.mesh_number].growth
     ours, drawn = hot.mesh_table(), cold.mesh_table()
-    if isinstance(ours, PairTable):
+    if ours.is_separable:
         share = ours.position / hot.pair.path_of_contact
         on_path = (share > 0.02) & (share < 0.98)  # flanks of whole teeth end in edges
-        opened = ours.pinion.gap[0] + ours.wheel.gap[0]
-        opened = opened - drawn.pinion.gap[0] - drawn.wheel.gap[0]
+        opened = ours.pairs.gap[0, 0, 0] - drawn.pairs.gap[0, 0, 0]
         deviation = growth.deviation(hot.pair, ours.position)
         assert np.ptp(deviation[on_path]) > 1e-6
         assert_close(opened[on_path], deviation[on_path], atol=3e-8)
     else:
-        assert isinstance(ours, SlicedTable)
         shift = hot.flanks.deviation() - growth.deviation(
             hot.pair, np.array(ours.position)
         )

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from chord_tables import Slices, as_chords, with_table
+from chord_tables import Slices, as_chords, repeated, with_table
 from closeness import assert_close
 from lane_tools import advance
 from line_tools import (
@@ -24,8 +24,8 @@ from gensig.driveline.time.toothed_mesh import toothed_mesh
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.errors import ConfigError
 from gensig.faults.broken import MissingTooth
-from gensig.mesh.load_distribution import Meeting
-from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
+from gensig.mesh.load_distribution import Meeting, pair_states, static_mesh
+from gensig.mesh.tooth_table import GearTeeth
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_sliced_pair
 
@@ -72,9 +72,9 @@ class TestLaw:
         table, force = helical
         rolls = np.linspace(0.05, 30.05, 61)
         meeting = Meeting(errors=mesh.errors)
-        computed = chord_equilibrium(
+        computed = static_mesh(
             table,
-            chord_states(table, rolls * table.pair.base_pitch, meeting),
+            pair_states(table, rolls * table.pair.base_pitch, meeting),
             share * force,
         )
         forces = [
@@ -200,23 +200,13 @@ class TestAgainstThePair:
         spur = machine({"mesh.points_per_pitch": 2048})
         table = Slices(spur, HELIX).table(DEPTH)
         if request.param == "missing tooth":
-            kind = np.zeros_like(table.pinion_kind)
+            kind = np.zeros_like(table.pinion.kind)
             kind[2] = 1
-            doubled = {
-                name: np.concatenate(2 * [getattr(table, name)])
-                for name in (
-                    "compliance",
-                    "compliance_slope",
-                    "gap",
-                    "gap_slope",
-                )
-            }
             present = np.array([True, False])
             table = replace(
                 table,
-                pinion_kind=kind,
-                pinion_present=present,
-                **doubled,
+                pinion=GearTeeth(kind=kind, present=present),
+                parts=(repeated(table.pairs, 2),),
             )
         rng = np.random.default_rng(1)
         errors = {

@@ -18,7 +18,8 @@ from gensig.dynamics.integrator import Solver, integrate
 from gensig.dynamics.mesh_state import NO_TOOTH, mesh_state
 from gensig.dynamics.pair import PAIR_DOFS
 from gensig.faults.broken import MissingTooth
-from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
+from gensig.mesh.load_distribution import pair_states, static_mesh
+from gensig.mesh.tooth_table import TablePart
 
 HELIX = math.radians(20.0)
 DEPTH = np.array([0.0, 2.0, 5.0, 9.0, 14.0, 20.0]) * 1e-6
@@ -201,7 +202,7 @@ class TestStatics:
         roll = pitch * (np.arange(12) + 0.4) / 4
         older = np.arange(table.last_pitch - table.first_pitch)
 
-        static = chord_equilibrium(table, chord_states(table, roll), force)
+        static = static_mesh(table, pair_states(table, roll), force)
 
         assert_close(static.load.sum(axis=1), force, 1e-12)
 
@@ -223,7 +224,7 @@ class TestEnergy:
         assert motion.stored.min() > 0.0
         assert motion.residual < 5e-4
 
-        nothing = np.zeros_like(helical.table.gap)
+        nothing = np.zeros_like(helical.table.pairs.gap)
         monkeypatch.setattr(
             lanes,
             "left_out_energy",
@@ -257,21 +258,10 @@ class TestChords:
             0.0,
             0.0,
         )
-        names = (
-            "compliance",
-            "compliance_slope",
-            "gap",
-            "gap_slope",
-        )
-        chords = {name: getattr(table, name) for name in names}
-        for name, values in chords.items():
-            single = values[:, :, table.set_chord, None]
-            chords[name] = np.repeat(
-                single,
-                len(table.depth),
-                axis=2,
-            )
-        alone = with_teeth(helical, table=replace(table, **chords))
+        single = (values[:, :, table.set_chord, None] for values in table.pairs)
+        chords = (np.repeat(values, len(table.depth), axis=2) for values in single)
+        parts = (TablePart._make(chords),)
+        alone = with_teeth(helical, table=replace(table, parts=parts))
         force = laws(helical, motions)[:, 0]
 
         assert force[-1] < -100.0

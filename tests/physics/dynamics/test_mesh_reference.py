@@ -5,7 +5,7 @@ from itertools import chain, combinations
 import numpy as np
 import pytest
 from closeness import assert_close
-from fault_cases import one
+from fault_cases import one, side_of
 from lane_tools import laws, motion_of, right_hand_side
 
 from gensig.dynamics._layout import DAMPING
@@ -95,7 +95,7 @@ class Reference:
         position = roll - index * self.pair.base_pitch
         values = np.zeros((4, len(index)))
         for name in ("pinion", "wheel"):
-            side = getattr(self.table, name)
+            side = side_of(self.table, name)
             kinds = tooth_at(side.kind, index)
             for k, kind in enumerate(kinds):
                 place = position[k : k + 1]
@@ -173,7 +173,7 @@ class Reference:
         n = np.arange(-40, 41)
         at = 2 * self.pair.pitch_point + (0.5 - n) * pitch - roll
         chosen = (at >= position[0]) & (at < position[-1]) & self.present(-n)
-        sides = self.table.pinion, self.table.wheel
+        sides = [side_of(self.table, gear) for gear in ("pinion", "wheel")]
         values = sum(columns(side, 0, at[chosen], position) for side in sides)
         squeezed = -approach - self.pair.backlash
         load, along, stored, lost = self.law(

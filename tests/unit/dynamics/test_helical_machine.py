@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from chord_tables import Slices, as_chords, with_table
+from chord_tables import Slices, as_chords, repeated, with_table
 from closeness import assert_close
 from lane_tools import with_teeth
 
@@ -16,12 +16,12 @@ from gensig.dynamics.backends.nystroem.machine_lanes import (
     pack,
 )
 from gensig.dynamics.equations import N_IN_PLANE
-from gensig.dynamics.helical import AXIAL_DOFS, half_lag, pitches
+from gensig.dynamics.helical import AXIAL_DOFS, pitches
 from gensig.dynamics.integrator import check_channels
 from gensig.dynamics.mesh_statics import loss_arm
 from gensig.dynamics.pair import PAIR_DOFS, Body, Support
 from gensig.errors import ConfigError
-from gensig.mesh.sliced.sliced_statics import left_out_energy
+from gensig.mesh.tooth_table import GearTeeth, left_out_energy
 from gensig.sensing.manufacturing import nominal_gearbox
 from gensig.systems.supports import in_gearbox
 from gensig.units import is_turning, read
@@ -211,14 +211,14 @@ def test_a_gearbox_keeps_the_axial_support(xiamen):
 
 def test_pairs_and_lag_follow_the_table(helical, spur):
     assert pitches(spur.table) == (-1, 3)
-    assert half_lag(spur.table) == 0.0
+    assert spur.table.half_lag == 0.0
 
     first, last = pitches(helical.table)
     assert pack([helical], 1e-6).n_pairs == last - first > 4
 
     pair = helical.table.pair
     assert_close(
-        2.0 * half_lag(helical.table),
+        2.0 * helical.table.half_lag,
         pair.overlap_ratio * pair.base_pitch,
         1e-12,
     )
@@ -226,7 +226,7 @@ def test_pairs_and_lag_follow_the_table(helical, spur):
 
 def test_sliding_turns_with_the_middle_of_the_face_at_the_pitch_point(helical):
     table = helical.table
-    lag = half_lag(helical.table)
+    lag = helical.table.half_lag
     position = table.pair.pitch_point + lag + np.linspace(-0.3, 0.3, 7) * lag
     arms = loss_arm(table, position)
 
@@ -238,11 +238,13 @@ def test_sliding_turns_with_the_middle_of_the_face_at_the_pitch_point(helical):
 def test_unused_kinds_of_teeth_are_not_stored(spur):
     """Rows are the kinds of teeth that meet; sound ones come first for the back flanks."""
     table = as_chords(spur.table, 2)
-    names = "compliance", "compliance_slope", "gap", "gap_slope"
-    three = {name: np.concatenate([getattr(table, name)] * 3) for name in names}
-    kind = np.full_like(table.pinion_kind, 2)
+    kind = np.full_like(table.pinion.kind, 2)
     present = np.array([True, True, False])
-    odd = replace(table, **three, pinion_kind=kind, pinion_present=present)
+    odd = replace(
+        table,
+        pinion=GearTeeth(kind=kind, present=present),
+        parts=(repeated(table.pairs, 3),),
+    )
     missing, sound = (pack([with_table(spur, each)], 1e-6) for each in (odd, table))
 
     end = missing_cells().size

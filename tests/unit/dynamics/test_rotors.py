@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from chord_tables import repeated
 from closeness import assert_close
 from scipy.optimize import brentq
 
@@ -13,6 +14,7 @@ from gensig.dynamics import mesh_statics
 from gensig.dynamics.lanes import near_positions
 from gensig.dynamics.pair import DOFS, PAIR_DOFS, Rotor
 from gensig.errors import ConfigError
+from gensig.mesh.tooth_table import GearTeeth
 from gensig.operation.courses import Profile
 from gensig.systems.registry import read_system
 
@@ -355,20 +357,16 @@ class TestMeanStiffness:
         table = smooth.mesh_table()
         force = smooth.mesh_force
         sound = mesh_statics.mean_mesh_stiffness(table, force)
-        pinion = table.pinion
-        names = (
-            "gap",
-            "gap_slope",
-            "present",
-            "compliance",
-            "compliance_slope",
-        )
-        rows = {name: np.repeat(getattr(pinion, name), 2, axis=0) for name in names}
-        rows["compliance"] = rows["compliance"] * [[1.0], [2.0]]
+        of_pinion, of_wheel = table.parts
+        doubled = repeated(of_pinion, 2)
+        doubled.compliance[1] *= 2.0
+        parts = doubled, of_wheel
+        present = np.array([True, True])
 
         def softer(n_soft):
             kind = (np.arange(23) < n_soft).astype(int)
-            changed = replace(table, pinion=replace(pinion, kind=kind, **rows))
+            pinion = GearTeeth(kind=kind, present=present)
+            changed = replace(table, pinion=pinion, parts=parts)
             return mesh_statics.mean_mesh_stiffness(changed, force)
 
         assert softer(11) == sound

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from closeness import assert_close
 from core_runs import CLASSICAL, PAPER, CoreRun
-from fault_cases import one
+from fault_cases import GEARS, one, side_of
 from lane_tools import laws
 
 from gensig.dynamics import lanes
@@ -86,9 +86,8 @@ def test_every_pair_of_teeth_has_the_sum_of_its_tables(
     for column, name in enumerate(
         ("compliance", "compliance_slope", "gap", "gap_slope")
     ):
-        pinion, wheel = (
-            getattr(side, name)[side.kind] for side in (table.pinion, table.wheel)
-        )
+        sides = (side_of(table, gear) for gear in GEARS)
+        pinion, wheel = (getattr(side, name)[side.kind] for side in sides)
         for lane in (0, -1):
             result = values[lane, :, :, column]
             for tooth in (0, 4, 22):

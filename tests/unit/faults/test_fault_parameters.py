@@ -4,7 +4,7 @@ import math
 
 import pytest
 import yaml
-from fault_cases import KINDS, one, option
+from fault_cases import KINDS, one, option, side_of
 from numpy.testing import assert_allclose
 from refusals import refused
 
@@ -321,7 +321,7 @@ def test_the_papers_law_has_no_gaps(paper_machine, xiamen, words):
     fault, message = typed(words), r"pinion tooth .*whole face width.* mesh\.law=one_s"
     with pytest.raises(FaultError, match=message):
         paper_machine.mesh_table((fault,))
-    gap = xiamen.mesh_table((fault,)).pinion.gap
+    gap = side_of(xiamen.mesh_table((fault,)), "pinion").gap
     assert gap[1].max() > gap[0].min()
 
 

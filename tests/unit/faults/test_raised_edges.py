@@ -78,7 +78,7 @@ def test_a_burr_at_the_break_touches_first(xiamen, kind):
         xiamen.mesh_table((edged(kind, height, **shape),)) for height in (20.0, 0.0)
     )
     row = with_burr.pinion.kind[0]
-    earlier = plain.pinion.gap[row] - with_burr.pinion.gap[row]
+    earlier = side_of(plain, "pinion").gap[row] - side_of(with_burr, "pinion").gap[row]
     assert earlier.min() > -0.01 * UM
     assert 15 * UM < earlier.max() <= 20.1 * UM
 
@@ -118,7 +118,7 @@ def test_the_bump_survives_the_table(machine):
     def gap(points):
         system = machine({"mesh.points_per_pitch": points})
         table = system.mesh_table((edged("pitting"),))
-        return table.position, table.pinion.gap[table.pinion.kind[0]]
+        return table.position, side_of(table, "pinion").gap[table.pinion.kind[0]]
 
     usual, fine = gap(512), gap(2048)
     inside = (fine[0] > 0.0) & (fine[0] < 10e-3)

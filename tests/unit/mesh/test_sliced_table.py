@@ -20,7 +20,6 @@ from gensig.mesh.load_distribution import (
     static_mesh,
 )
 from gensig.mesh.sliced import sliced_table
-from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
 from gensig.mesh.sliced.sliced_table import DEEPEST, N_CHORDS
 from gensig.mesh.sliced.slices import (
     loaded_contact,
@@ -43,7 +42,7 @@ def faults_of(*words):
 
 def at_rest(table, roll, force, meeting=PERFECT):
     """Approach and load (phase, pair) of the chords under a total force."""
-    static = chord_equilibrium(table, chord_states(table, roll, meeting), force)
+    static = static_mesh(table, pair_states(table, roll, meeting), force)
     return static.approach, static.load
 
 
@@ -144,8 +143,8 @@ def test_faulty_teeth_have_their_own_chords(fault, share):
     approach, _ = at_rest(table, roll, system.mesh_force)
 
     assert_close(approach, exact.approach, share)
-    assert len(table.pinion_present) == 2
-    assert len(table.wheel_present) == 1
+    assert len(table.pinion.present) == 2
+    assert len(table.wheel.present) == 1
 
     sound = at_rest(system.mesh_table(), roll, system.mesh_force)[0]
     assert np.abs(exact.approach - sound).max() > 2.0 * share * sound.max()
@@ -176,12 +175,14 @@ def test_teeth_that_all_share_a_form_are_computed_once():
     crack = faults_of("fault=crack", "fault.crack_depth_mm=1", "fault.tooth=3")
     table = system.mesh_table((form, *crack))
 
-    assert table.compliance.shape[:2] == (3, 1)
-    assert table.pinion_kind[3] == 2
-    assert np.bincount(table.pinion_kind).tolist() == [0, 60, 1]
+    assert table.pairs.compliance.shape[:2] == (3, 1)
+    assert table.pinion.kind[3] == 2
+    assert np.bincount(table.pinion.kind).tolist() == [0, 60, 1]
 
     again = system.mesh_table((form,))
-    np.testing.assert_array_equal(again.compliance[1, 0], table.compliance[1, 0])
+    np.testing.assert_array_equal(
+        again.pairs.compliance[1, 0], table.pairs.compliance[1, 0]
+    )
     np.testing.assert_array_equal(again.depth, table.depth)
     assert system.mesh_table((form,)) is again
 
@@ -200,8 +201,8 @@ def test_chords_are_convex_and_meet():
     assert len(table.depth) == N_CHORDS
     assert table.depth[0] == 0.0
 
-    compliance = table.compliance[0, 0] - table.shared_compliance
-    gap = table.gap[0, 0]
+    compliance = table.pairs.compliance[0, 0] - table.shared_compliance
+    gap = table.pairs.gap[0, 0]
     near = gap[0] < 20e-6
 
     assert (np.diff(compliance[:, near], axis=0) < 1e-4 * compliance[1:, near]).all()
@@ -229,17 +230,17 @@ def test_ends_are_out_of_reach():
         pitch = table.pair.base_pitch
         assert_close(table.position[0], table.first_pitch * pitch, 1e-6)
         assert_close(table.position[-1], table.last_pitch * pitch, 1e-6)
-        assert table.gap[0, 0, 0, [0, -1]].min() > 90e-6
-        assert np.isfinite(table.compliance).all()
-        assert np.isfinite(table.gap).all()
+        assert table.pairs.gap[0, 0, 0, [0, -1]].min() > 90e-6
+        assert np.isfinite(table.pairs.compliance).all()
+        assert np.isfinite(table.pairs.gap).all()
 
 
 def test_slopes_are_those_of_the_values():
     _, table, _ = table_of()
     distance = table.position[1] - table.position[0]
     for values, slopes in (
-        (table.compliance, table.compliance_slope),
-        (table.gap, table.gap_slope),
+        (table.pairs.compliance, table.pairs.compliance_slope),
+        (table.pairs.gap, table.pairs.gap_slope),
     ):
         step = 0.5 * distance * (slopes[..., 1:] + slopes[..., :-1])
         atol = 1e-9 * np.abs(values).max()
@@ -260,10 +261,10 @@ def test_steps_are_smoothed_without_ringing(monkeypatch):
         force=system.mesh_force,
         deviation=system.deviation(),
     )
-    values = plain.compliance[0, 0]
+    values = plain.pairs.compliance[0, 0]
     mean = 0.25 * (values[:, 2:] + 2.0 * values[:, 1:-1] + values[:, :-2])
     most = 0.25 * pair_table.SMOOTHED_SHARE * values.min(axis=1)
-    off = np.abs(table.compliance[0, 0, :, 1:-1] - mean).max(axis=1)
+    off = np.abs(table.pairs.compliance[0, 0, :, 1:-1] - mean).max(axis=1)
 
     assert (off < (1.0 + 1e-6) * most).all()
     assert (np.abs(np.diff(values, axis=1)).max(axis=1) > 10.0 * most).all()
@@ -292,13 +293,13 @@ def test_the_papers_law_has_one_chord():
         "mesh.allow_extrapolation=true",
         "mesh.contact=linear",
     )
-    assert table.compliance.shape[2] == 1
+    assert table.pairs.compliance.shape[2] == 1
 
     inside = np.linspace(0.1, 0.9, 17) * (system.pair.path_of_contact + mesh.lag[-1])
     exact = single_pair_stiffness(mesh, inside, system.mesh_force)
-    result = 1.0 / np.interp(inside, table.position, table.compliance[0, 0, 0])
+    result = 1.0 / np.interp(inside, table.position, table.pairs.compliance[0, 0, 0])
 
     # slices that bend each other are stiffer where only a part of the face is loaded
     assert (result > 0.999 * exact).all()
     assert_close(result, exact, 0.15)
-    np.testing.assert_array_equal(table.gap[0, 0, 0], 0.0)
+    np.testing.assert_array_equal(table.pairs.gap[0, 0, 0], 0.0)

@@ -6,10 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closeness import assert_close
+from fault_cases import side_of
 from numpy.testing import assert_array_equal
 from refusals import refused
 
 from gensig.errors import ConfigError, ExtrapolationError, GeometryError
+from gensig.geometry.contact import SIDES
 from gensig.mesh.modification import FlankModification
 from gensig.mesh.thermal.body_heat import heat_capacity, time_constant
 from gensig.mesh.thermal.paper_growth import READINGS
@@ -115,9 +117,9 @@ def test_records_have_the_papers_hot_teeth(law):
     )
     assert hot.flanks.hot_teeth is not None
     assert grown.flanks.hot_teeth is None
-    tables = [machine.mesh_table().compliance for machine in (hot, grown, cold)]
+    tables = [machine.mesh_table().pairs.compliance for machine in (hot, grown, cold)]
     assert np.abs(tables[0] / tables[1] - 1.0).max() > 1e-4
-    plain = replace(hot.flanks, hot_teeth=None).mesh_table().compliance
+    plain = replace(hot.flanks, hot_teeth=None).mesh_table().pairs.compliance
     assert np.abs(tables[0] / plain - 1.0).max() > 1e-4
 
 
@@ -327,10 +329,7 @@ def test_both_flanks_of_spur_teeth_open_the_gap_that_slices_have():
     sound, hot = spur_of(heat="none").mesh_table(), pair.mesh_table()
     share = hot.position / pair.pair.path_of_contact
     on_path = (share > 0.02) & (share < 0.98)  # flanks of whole teeth end in edges
-    opened = [
-        side.gap[0] - drawn.gap[0]
-        for side, drawn in ((hot.pinion, sound.pinion), (hot.wheel, sound.wheel))
-    ]
+    opened = [side_of(hot, gear).gap[0] - side_of(sound, gear).gap[0] for gear in SIDES]
     growth = pair.modification.growth
     expected = growth.deviation(pair.pair, hot.position)
     assert np.ptp(expected[on_path]) > 2e-6

@@ -171,7 +171,11 @@ def parts(table):
     result = {}
     for field in fields(table):
         value = getattr(table, field.name)
-        below = parts(value) if is_dataclass(value) else {"": value}
+        below = {"": value}
+        if is_dataclass(value):
+            below = parts(value)
+        if field.name == "parts":
+            below = table.pairs._asdict()
         result |= {f"{field.name}.{name}": each for name, each in below.items()}
     return result
 

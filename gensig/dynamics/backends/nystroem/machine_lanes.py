@@ -36,7 +36,6 @@ from gensig.dynamics.lanes import (
 )
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.errors import SimulationError
-from gensig.mesh.pair_table import PairTable
 
 Array = NDArray[np.float64]
 
@@ -52,7 +51,7 @@ def is_followed_by_three(teeth: MeshTeeth) -> bool:
     pair, options = teeth.pair, teeth.table.options
     contact_ratio = pair.path_of_contact / pair.base_pitch
     return (
-        isinstance(teeth.table, PairTable)
+        teeth.table.is_separable
         and options.law == "one_sided"
         and contact_ratio <= MOST_CONTACT_RATIO
     )
@@ -65,7 +64,7 @@ def group_kind(equations: Equations) -> type[Group]:
         return HelicalPairGroup if is_pair else AxialChordGroup
     if all(is_followed_by_three(mesh.teeth) for mesh in equations.meshes):
         return SpurPairGroup if is_pair else SpurGroup
-    if is_pair and isinstance(first.teeth.table, PairTable):
+    if is_pair and first.teeth.table.is_separable:
         return AnyLawPairGroup
     return ChordGroup
 
