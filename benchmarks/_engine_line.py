@@ -8,14 +8,29 @@ Assumed: supports, backlash, damping, the ripple of mesh stiffness, torques.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks._phase_mesh import phase_mesh
-from gensig.driveline.time.course import ShaftTorque
-from gensig.driveline.time.geared_line import GearedLine
-from gensig.driveline.time.line_mesh import LineMesh
+from benchmarks._phase_mesh import phase_table, plain_pair
+from gensig.driveline.time.course import ShaftTorque, constant_speed
+from gensig.driveline.time.line_dynamics import LineDynamics
+from gensig.dynamics.equations import (
+    A_TURN,
+    A_X,
+    A_Y,
+    B_TURN,
+    B_X,
+    B_Y,
+    N_IN_PLANE,
+    NONE,
+    Equations,
+    Mesh,
+)
+from gensig.dynamics.mesh_teeth import MeshTeeth
+from gensig.geometry.contact import GearPair
 
 Array = NDArray[np.float64]
 
@@ -108,14 +123,21 @@ END_GEARS, DRAG = (
 )  # places of the ends of the branches in the line; N m, assumed
 
 
-def base_radius(n_teeth: int, helix_angle: float) -> float:
-    """Base radius in m of a gear with a helix angle in degrees."""
-    helix = math.radians(helix_angle)
-    transverse = math.atan(math.tan(PRESSURE_ANGLE) / math.cos(helix))
-    return 0.5 * n_teeth * MODULE / math.cos(helix) * math.cos(transverse)
+def engine_pair(z_a: int, z_b: int, helix: float) -> GearPair:
+    """Two gears of the engine's module; helix angle in degrees."""
+    angle = math.radians(helix)
+    across = math.atan(math.tan(PRESSURE_ANGLE) / math.cos(angle))
+    base_radius = 0.5 * z_a * MODULE / math.cos(angle) * math.cos(across)
+    return plain_pair((z_a, z_b), base_radius, angle)
 
 
-def engine_line(*, lateral: bool = True, linear: bool = False) -> GearedLine:
+def engine_line(
+    *,
+    lateral: bool = True,
+    linear: bool = False,
+    torques: Sequence[ShaftTorque] = (),
+    speed: float = 0.0,
+) -> LineDynamics:
     """The whole line, rigid compounds merged: 65 rotations, and 44 lateral motions of 11 gears on
     their bearings.
 
@@ -154,40 +176,52 @@ def engine_line(*, lateral: bool = True, linear: bool = False) -> GearedLine:
         MESHES, key=lambda mesh: (mesh[0] > 21, mesh[0], mesh[1])
     ):
         a, b = at_of[driver], at_of[driven]
-        radii = base_radius(z_a, helix), base_radius(z_b, helix)
+        pair = engine_pair(z_a, z_b, helix)
+        radii = pair.pinion.base_radius, pair.wheel.base_radius
         rotation[b] = -rotation[a] * z_a / z_b
-        direction = np.zeros(n)
-        direction[a], direction[b] = (
-            math.copysign(radii[0], rotation[a]),
-            math.copysign(radii[1], rotation[a]),
-        )
+        touched = np.array([NONE, NONE, a, NONE, NONE, b])
+        reach = np.zeros(N_IN_PLANE)
+        reach[[A_TURN, B_TURN]] = np.copysign(radii, rotation[a])
         if lateral:  # lines of action lie at assumed angles
             angle = 0.7 * len(meshes)
-            for node, sign in ((driver, 1.0), (driven, -1.0)):
-                direction[side_of[node] : side_of[node] + 2] = (
-                    sign * math.cos(angle),
-                    sign * math.sin(angle),
-                )
+            along = math.cos(angle), math.sin(angle)
+            touched[[A_X, A_Y]] = side_of[driver], side_of[driver] + 1
+            touched[[B_X, B_Y]] = side_of[driven], side_of[driven] + 1
+            reach[[A_X, A_Y]], reach[[B_X, B_Y]] = along, np.negative(along)
         meshes.append(
-            _mesh(
-                f"{driver}-{driven}",
-                direction,
-                a,
-                (z_a, z_b),
-                value * 1e6 / (radii[0] * radii[1]),
-                linear,
+            Mesh(
+                name=f"{driver}-{driven}",
+                teeth=_teeth(pair, value * 1e6 / (radii[0] * radii[1]), linear),
+                touched=touched,
+                reach=reach,
+                slide=np.zeros(N_IN_PLANE),
+                damping=MESH_DAMPING * (not linear),
+                mean_force=1.0,
+                speed=abs(rotation[a]) * speed,
             )
         )
     for node, _ in SHAFTS:  # camshafts and pump shafts turn with their gear
         if rotation[at_of[node + 1]] == 0.0:
             rotation[at_of[node + 1]] = rotation[at_of[node]]
-    return GearedLine(
-        names=tuple(names),
-        mass=mass,
+    system = Equations(
+        mass=np.diag(mass),
         damping=damping,
         stiffness=stiffness,
         rotation=rotation,
+        held=np.zeros(n),
+        held_damping=0.0,
         meshes=tuple(meshes),
+        sources=(),
+        reference=0,
+        angles=(),
+    )
+    return LineDynamics(
+        names=tuple(names),
+        system=system,
+        nominal=constant_speed(speed),
+        torques=tuple(torques),
+        friction_torque=np.zeros(n),
+        reference_force=np.ones(len(meshes)),
     )
 
 
@@ -227,30 +261,15 @@ def engine_torques(mean: float = 5e3, pulse: float = 30.0) -> list[ShaftTorque]:
     ]
 
 
-def _mesh(
-    name: str,
-    direction: Array,
-    a: int,
-    n_teeth: tuple[int, int],
-    stiffness: float,
-    linear: bool,
-) -> LineMesh:
-    u = np.arange(64) / 64
-    ripple = sum(
-        share * np.cos(2.0 * math.pi * (i + 1) * u + i)
-        for i, share in enumerate(RIPPLE)
-    )
-    return phase_mesh(
-        name,
-        direction=direction,
-        roll_dof=a,
-        n_teeth=n_teeth,
-        stiffness=stiffness * np.ones((1, 64))
-        if linear
-        else stiffness * (1.0 + ripple)[None],
-        backlash=0.0 if linear else BACKLASH,
-        damping=0.0 if linear else MESH_DAMPING,
-    )
+def _teeth(pair: GearPair, stiffness: float, linear: bool) -> MeshTeeth:
+    """Teeth whose stiffness ripples, or not."""
+    ripple = np.zeros(64)
+    if not linear:
+        pair = replace(pair, backlash=BACKLASH)
+        u = np.arange(len(ripple)) / len(ripple)
+        for i, share in enumerate(RIPPLE):
+            ripple += share * np.cos(2.0 * math.pi * (i + 1) * u + i)
+    return MeshTeeth.perfect(phase_table(pair, stiffness * (1.0 + ripple)[None]))
 
 
 def _spring(matrix: Array, one: int, other: int, value: float) -> None:

@@ -16,7 +16,7 @@ import time
 import numpy as np
 
 from benchmarks._engine_line import DRAG, END_GEARS, engine_line, engine_torques
-from gensig.driveline.time.course import ShaftTorque, constant_speed
+from gensig.driveline.time.course import ShaftTorque
 from gensig.driveline.time.newmark import LineMotion, LineSolver, integrate_line
 from gensig.dynamics.decimation import in_band_error
 
@@ -42,16 +42,15 @@ def engine_run(
 
     ``loaded`` teeth stay together, others rattle.
     """
-    line, torques = engine_line(), engine_torques()
+    torques = engine_torques()
     if loaded:
         torques = engine_torques(*CALM) + [
             ShaftTorque(dof=dof, table=np.array([-DRAG])) for dof in END_GEARS
         ]
+    line = engine_line(torques=torques, speed=SPEED)
     begin = time.process_time()
     motion = integrate_line(
         line,
-        constant_speed(SPEED),
-        torques,
         LineSolver(
             sampling_rate=RATE, oversampling=oversampling, max_energy_residual=1e-3
         ),

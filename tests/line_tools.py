@@ -5,17 +5,27 @@ instants.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from benchmarks._phase_mesh import phase_mesh
+from benchmarks._phase_mesh import phase_table, plain_pair
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time._line_mesh_kernels import mesh_law
-from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
-from gensig.driveline.time.geared_line import GearedLine, pack_meshes
-from gensig.driveline.time.line_mesh import LineMesh
-from gensig.driveline.time.mesh_friction import MeshFriction, mesh_friction
+from gensig.driveline.time.course import ShaftTorque, constant_speed
+from gensig.driveline.time.line_arrays import pack_meshes
+from gensig.driveline.time.line_dynamics import LineDynamics
 from gensig.driveline.time.newmark import LineMotion, LineSolver, _Run, _scratch
+from gensig.dynamics.equations import (
+    A_TURN,
+    B_TURN,
+    N_IN_PLANE,
+    NONE,
+    Equations,
+    Mesh,
+)
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.pair import PairDynamics
 
 RADII, INERTIAS, TEETH = (0.05, 0.1), (0.01, 0.05), (20, 40)
@@ -28,102 +38,130 @@ IMPLICIT = (
 )
 
 
+def line_of(system: Equations, names: Sequence[str] = (), **more) -> LineDynamics:
+    """A line that turns at 0 rad/s and feels nothing."""
+    n = len(system.mass)
+    return LineDynamics(
+        **{
+            "names": tuple(names) or tuple(f"disc_{i}" for i in range(n)),
+            "system": system,
+            "nominal": constant_speed(0.0),
+            "torques": (),
+            "friction_torque": np.zeros(n),
+            "reference_force": np.ones(len(system.meshes)),
+            **more,
+        }
+    )
+
+
+def bodies(
+    mass: np.ndarray,
+    stiffness: np.ndarray,
+    damping: np.ndarray,
+    rotation: np.ndarray,
+    meshes: Sequence[Mesh] = (),
+    **governor,
+) -> Equations:
+    """Bodies, springs and meshes; no governor unless one is given."""
+    return Equations(
+        mass=mass,
+        stiffness=stiffness,
+        damping=damping,
+        rotation=rotation,
+        **{"held": np.zeros(len(mass)), "held_damping": 0.0, **governor},
+        meshes=tuple(meshes),
+        sources=(),
+        reference=int(np.argmin(np.abs(rotation - 1.0))),
+        angles=(),
+    )
+
+
+def turning_mesh(teeth: MeshTeeth, damping: float = 0.0) -> Mesh:
+    """A mesh between the first two bodies, which only turn."""
+    pair = teeth.pair
+    reach = np.zeros(N_IN_PLANE)
+    reach[[A_TURN, B_TURN]] = pair.pinion.base_radius, -pair.wheel.base_radius
+    return Mesh(
+        name="pair",
+        teeth=teeth,
+        touched=np.array([NONE, NONE, 0, NONE, NONE, 1]),
+        reach=reach,
+        slide=np.zeros(N_IN_PLANE),
+        damping=damping,
+        mean_force=1.0,
+        speed=1.0,
+    )
+
+
 def two_gears(
     *,
     stiffness: np.ndarray | None = None,
+    gap: np.ndarray | None = None,
+    backlash: float = 0.0,
     damping: float = 0.0,
     drive: tuple[float, float] | None = None,
-    **mesh,
-) -> GearedLine:
+    **more,
+) -> LineDynamics:
     """Two inertias and one mesh between them; ``drive`` is a spring and a damper of the first to
     the nominal angle.
     """
     if stiffness is None:
         stiffness = np.full((1, 8), STIFFNESS)
-    direction = np.array([RADII[0], -RADII[1]])
     held, damped = np.zeros((2, 2, 2))
     if drive is not None:
         held[0, 0], damped[0, 0] = drive
-    one = phase_mesh(
-        "pair",
-        direction=direction,
-        roll_dof=0,
-        n_teeth=TEETH,
-        stiffness=stiffness,
-        damping=damping,
-        **mesh,
-    )
-    return GearedLine(
-        names=("first", "second"),
-        mass=np.diag(INERTIAS),
-        damping=damped,
-        stiffness=held,
-        rotation=np.array([1.0, 0.5]),
-        meshes=(one,),
-    )
+    pair = replace(plain_pair(TEETH, RADII[0]), backlash=backlash)
+    mesh = turning_mesh(MeshTeeth.perfect(phase_table(pair, stiffness, gap)), damping)
+    system = bodies(np.array(INERTIAS), held, damped, np.array([1.0, 0.5]), [mesh])
+    return line_of(system, ("first", "second"), **more)
 
 
-def chain(n: int, *, loss: float = 2e-5, seed: int = 0) -> GearedLine:
+def chain(n: int, *, loss: float = 2e-5, seed: int = 0) -> LineDynamics:
     """A free chain of inertias without gears."""
     rng = np.random.default_rng(seed)
     stiffness = np.zeros((n, n))
     for i, value in enumerate(rng.uniform(1e4, 3e4, n - 1)):
         stiffness[[i, i + 1], [i, i + 1]] += value
         stiffness[[i, i + 1], [i + 1, i]] -= value
-    return GearedLine(
-        names=tuple(f"disc_{i}" for i in range(n)),
-        mass=np.diag(rng.uniform(0.01, 0.1, n)),
-        damping=loss * stiffness,
-        stiffness=stiffness,
-        rotation=np.ones(n),
-        meshes=(),
+    mass = rng.uniform(0.01, 0.1, n)
+    return line_of(bodies(mass, stiffness, loss * stiffness, np.ones(n)))
+
+
+def pair_line(dynamics: PairDynamics, **more) -> LineDynamics:
+    """A gear pair with its supports and drive as a line with one mesh, with all of its torques."""
+    return line_of(
+        dynamics.equations,
+        dynamics.dofs,
+        **{
+            "nominal": constant_speed(dynamics.operating.speed),
+            "torques": constant_torques(dynamics.system().force),
+            **more,
+        },
     )
 
 
-def pair_line(dynamics: PairDynamics, mesh: LineMesh) -> GearedLine:
-    """A gear pair with its supports and drive as a line with one mesh."""
-    system = dynamics.system()
-    return GearedLine(
-        names=system.names,
-        mass=np.diag(system.mass),
-        damping=system.damping,
-        stiffness=system.stiffness,
-        rotation=system.rotation,
-        meshes=(mesh,),
-    )
-
-
-def pair_friction(dynamics: PairDynamics) -> MeshFriction:
-    """The friction of a gear pair, whose pinion turns against its frame."""
-    return mesh_friction(
-        dynamics.table,
-        dynamics.approach_direction(),
-        range(6),
-        dynamics.system().rotation,
-        -1.0,
-    )
-
-
-def constant_torques(values: np.ndarray) -> list[ShaftTorque]:
-    return [
+def constant_torques(values: np.ndarray) -> tuple[ShaftTorque, ...]:
+    return tuple(
         ShaftTorque(dof=i, table=np.array([value])) for i, value in enumerate(values)
-    ]
+    )
+
+
+def with_system(line: LineDynamics, **changes) -> LineDynamics:
+    """The line with other numbers of its bodies, springs and meshes."""
+    return replace(line, system=replace(line.system, **changes))
 
 
 def state_after(
-    line: GearedLine,
+    line: LineDynamics,
     start: tuple[np.ndarray, np.ndarray],
     duration: float,
     n_steps: int,
-    *,
-    torques: list[ShaftTorque] | None = None,
-    course: LineCourse | None = None,
 ) -> tuple[np.ndarray, np.ndarray, LineMotion]:
     """q and v (dof,) after ``n_steps`` steps from time 0, and what the run tells of itself."""
     solver = LineSolver(
         sampling_rate=0.5 * n_steps / duration, oversampling=2, max_energy_residual=1e-3
     )
-    run = _Run(line, course or constant_speed(0.0), torques or [], solver, start, [])
+    run = _Run(line, solver, start, [])
     run.begin(0)
     run.skip(n_steps)
     motion = run.motion(np.empty((0, 0)), np.empty(0), np.empty(0))
@@ -131,42 +169,28 @@ def state_after(
 
 
 def law_at(
-    mesh: LineMesh,
+    mesh: Mesh,
     turned: float,
     approach: float,
     rate: float = 0.0,
     roll_rate: float = 0.0,
 ) -> np.ndarray:
     """Law of a mesh, (N_LAW,), when it has rolled so many pitches beyond its start phase."""
-    n = len(mesh.direction)
-    line = GearedLine(
-        names=tuple(map(str, range(n))),
-        mass=np.eye(n),
-        damping=np.zeros((n, n)),
-        stiffness=np.zeros((n, n)),
-        rotation=np.where(np.arange(n) == mesh.roll_dof, 1.0, 0.0),
-        meshes=(),
-    )
-    with_mesh = _Unchecked(line, mesh)
+    n = int(mesh.touched.max()) + 1
+    nothing = np.zeros((n, n))
+    system = bodies(np.ones(n), nothing, nothing, np.ones(n), [mesh])
     law = np.zeros((1, layout.N_LAW))
     mesh_law(
-        pack_meshes(with_mesh, np.arange(n)),
+        pack_meshes(system, np.arange(n)),
         0,
-        mesh.start_phase + turned,
+        mesh.teeth.start_phase + turned,
         roll_rate,
         approach,
         rate,
         law,
-        _scratch(with_mesh),
+        _scratch(system),
     )
     return law[0]
-
-
-class _Unchecked:
-    """A line of one mesh whose kinematics do not matter."""
-
-    def __init__(self, line: GearedLine, mesh: LineMesh) -> None:
-        self.names, self.rotation, self.meshes = line.names, line.rotation, (mesh,)
 
 
 def steps(sampling_rate: float, oversampling: int) -> LineSolver:

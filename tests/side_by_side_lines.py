@@ -1,16 +1,12 @@
 """Lines for the two-evaluation core: a pair as a line, runs of line machines and their records."""
 
-import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 from stacked_motions import integrate, stacked
 
-from gensig.driveline.side_by_side.line_dynamics import LineDynamics
 from gensig.driveline.time.course import ShaftTorque, constant_speed
-from gensig.driveline.time.geared_line import GearedLine
-from gensig.driveline.time.toothed_mesh import toothed_mesh
+from gensig.driveline.time.line_dynamics import LineDynamics
 from gensig.dynamics.backends.base import Integration
 from gensig.dynamics.backends.registry import BACKENDS
 from gensig.dynamics.decimation import in_band_error
@@ -28,52 +24,36 @@ CHANNELS = ("pinion_x", "pinion_y", "wheel_x", "wheel_y", "wheel_rotation")
 
 def as_line(pair):
     """A gear pair without rotors as a line of one mesh, whose bodies stand in another order."""
-    system, damping = pair.system(), pair.mesh_damping / pair.mesh_force
+    system = pair.equations
     order = np.array([*WHEEL_FIRST, *range(6, len(pair.dofs))])
     places = np.argsort(order)
     pinion, wheel = (int(places[dof]) for dof in (PINION_ROTATION, WHEEL_ROTATION))
     both = np.ix_(order, order)
-    mesh = toothed_mesh(
-        "pair",
-        pair.teeth,
-        direction=pair.approach_direction()[order],
-        roll_dof=pinion,
-        damping=damping,
-    )
-    held = np.zeros(len(system.mass))
-    held[pinion] = math.sqrt(pair.drive_stiffness)
-    drive_damping = system.damping[PINION_ROTATION, PINION_ROTATION]
+    (mesh,) = system.meshes
     friction_torque = np.zeros(len(system.mass))
     friction_torque[pinion] = pair.friction_torque()
-    line = GearedLine(
-        names=tuple(system.names[dof] for dof in order),
-        mass=np.diag(system.mass[order]),
-        damping=system.damping[both],
-        stiffness=system.stiffness[both],
-        rotation=system.rotation[order],
-        meshes=(mesh,),
-        held=held,
-        held_damping=drive_damping / pair.drive_stiffness,
-        friction_torque=friction_torque,
-    )
     torque = pair.operating.torque
     driven = np.array([-torque * pair.table.pair.ratio])
-    running = SimpleNamespace(
-        line=line,
-        course=constant_speed(pair.operating.speed),
+    return LineDynamics(
+        names=tuple(pair.dofs[dof] for dof in order),
+        system=replace(
+            system,
+            mass=system.mass[order],
+            damping=system.damping[both],
+            stiffness=system.stiffness[both],
+            rotation=system.rotation[order],
+            held=system.held[order],
+            meshes=(replace(mesh, touched=places[mesh.touched]),),
+            reference=pinion,
+            angles=(pinion,),
+        ),
+        nominal=constant_speed(pair.operating.speed),
         torques=(
             ShaftTorque(dof=pinion, table=np.array([torque])),
             ShaftTorque(dof=wheel, table=driven),
         ),
-        mesh_force=np.array([pair.mesh_force]),
+        friction_torque=friction_torque,
         reference_force=np.array([pair.mesh_force]),
-    )
-    return LineDynamics(
-        running=running,
-        teeth=(pair.teeth,),
-        touched=places[None],
-        senses=np.array([-1.0]),
-        angles=(pinion,),
     )
 
 

@@ -76,6 +76,6 @@ def wheel_speed(
         disc = discs[number]
     ratio = line.machine.ratios[wheel.node]
     deviation = motion.signals["angle", line.dof(wheel.node)]
-    angle = ratio * (line.turned + motion.nominal_angle) + deviation
+    angle = ratio * (line.dynamics.turned + motion.nominal_angle) + deviation
     speed = instantaneous_speed(wheel, disc, angle, sampling_rate)
     return np.asarray(speed - ratio * motion.nominal_speed)

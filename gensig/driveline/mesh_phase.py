@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gensig.driveline.drive_line import DriveLine
 from gensig.driveline.linear.shaft_line import GearMesh
+from gensig.errors import GeometryError
 from gensig.geometry.contact import GearPair
 from gensig.systems.run import Start
 
@@ -146,3 +147,69 @@ def _driving_angle(
     return mesh.center_line + sense * (
         past * 2.0 * math.pi / pair.pinion.n_teeth - _half_teeth(pair)[0]
     )
+
+
+def mesh_start(
+    n_teeth: int,
+    *,
+    mate_angle: float,
+    drives: bool,
+    tooth_angle: float = 0.0,
+    pitch_point: float = 0.0,
+) -> tuple[int, float]:
+    """Start tooth and start phase of a gear's mesh with a mate at an angle, so that its meshes
+    agree with each other.
+
+    Parameters
+    ----------
+    mate_angle : rad    from the gear's center to the mate's, counted in the sense in which the
+        gear turns
+    drives : whether the gear drives there (its leading flanks touch) or is driven (its trailing
+        flanks)
+    tooth_angle : rad   where the middle of the gear's tooth 0 stands when all angles are 0
+    pitch_point : position of the pitch point in the tables of the mesh, pitches
+
+    Returns
+    -------
+    the tooth of pair 0, and the phase in pitches
+
+    Tooth 0's middle passes the mate at mate_angle, its flank a quarter pitch before (leading) or
+    behind (trailing); the tooth that enters next stands one pitch back. Standard teeth: tooth and
+    space are equal on the pitch circle. Source: the phases of Parker & Lin, Mesh Phasing
+    Relationships in Planetary and Epicyclic Gears (ASME DETC2003/PTG-48067), written for one
+    gear.
+    """
+    if n_teeth < 1:
+        raise GeometryError(f"a gear of {n_teeth} teeth has no phase")
+    passed = (
+        (tooth_angle - mate_angle) * n_teeth / (2.0 * math.pi)
+        + _quarter(drives)
+        + pitch_point
+    )
+    pair = math.floor(passed)
+    # the phase is taken within a pitch, so what was pair ``pair`` becomes pair 0
+    return pair % n_teeth, passed - pair
+
+
+def tooth_angle(
+    n_teeth: int,
+    *,
+    mate_angle: float,
+    drives: bool,
+    start: tuple[int, float],
+    pitch_point: float = 0.0,
+) -> float:
+    """Angle of the middle of a gear's tooth 0 if one of its meshes begins at ``start``, rad.
+
+    The inverse of ``mesh_start``, for the other meshes of a gear whose phase in one is known.
+    """
+    tooth, phase = start
+    return (
+        mate_angle
+        + (tooth + phase - _quarter(drives) - pitch_point) * 2.0 * math.pi / n_teeth
+    )
+
+
+def _quarter(drives: bool) -> float:
+    """Lead of the flank that touches over the middle of its tooth, pitches."""
+    return 0.5 * drives - 0.25

@@ -11,7 +11,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,24 +18,33 @@ from threadpoolctl import threadpool_limits
 
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.cycle import CYCLE
-from gensig.driveline.linear.forced import SteadyResponse, closed_line, steady_response
+from gensig.driveline.linear.forced import closed_line, steady_response
 from gensig.driveline.linear.matrices import LineMatrices
 from gensig.driveline.linear.modal import with_local_losses, with_viscous_losses
 from gensig.driveline.mesh_phase import start_phases
 from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
-from gensig.driveline.time.geared_line import GearedLine
-from gensig.driveline.time.line_mesh import LineMesh, even_mesh
-from gensig.driveline.time.mesh_friction import mesh_friction
+from gensig.driveline.time.line_dynamics import LineDynamics
 from gensig.driveline.time.newmark import (
     LineMotion,
     LineSolver,
     integrate_line,
     static_start,
 )
-from gensig.driveline.time.toothed_mesh import toothed_mesh
+from gensig.dynamics.equations import (
+    A_TURN,
+    A_X,
+    A_Y,
+    B_X,
+    B_Y,
+    N_IN_PLANE,
+    NONE,
+    Equations,
+    Mesh,
+)
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.errors import ConfigError, StepError
 from gensig.geometry.contact import GearPair
+from gensig.mesh.even_table import even_table
 from gensig.operation.setpoint import Operating
 
 Array = NDArray[np.float64]
@@ -116,29 +124,22 @@ def operating_course(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RunningLine:
-    """A line ready to be integrated; ``turned`` rad is where the crank stands at time 0.
+    """A line ready to be integrated.
 
-    ``linear`` is the steady vibration at the first speed if no mesh parts, on the same degrees of
-    freedom; ``mesh_force`` (mesh,) N are the mean forces in it.
+    ``mesh_force`` (mesh,) N are the mean forces; ``teeth`` are those of meshes that are tabulated.
     """
 
     machine: EngineLine
     matrices: LineMatrices
-    line: GearedLine
-    course: LineCourse
-    torques: tuple[ShaftTorque, ...]
-    linear: SteadyResponse
+    dynamics: LineDynamics
     mesh_force: Array
-    turned: float
     teeth: Mapping[int, MeshTeeth]
 
-    @property
-    def reference_force(self) -> Array:
-        """Forces at which contact and damping of the meshes are taken, (mesh,) N."""
-        forces = enumerate(self.mesh_force.tolist())
-        return np.array(
-            [reference_force(self.machine, m, force) for m, force in forces]
-        )
+    def with_angles(self, nodes: Sequence[int]) -> RunningLine:
+        """The line whose motion gives out the angles of nodes, by their numbers."""
+        angles = tuple(self.dof(node) for node in nodes)
+        system = replace(self.dynamics.system, angles=angles)
+        return replace(self, dynamics=replace(self.dynamics, system=system))
 
     def dof(self, node: int) -> int:
         """Index of the degree of freedom that a node, by its number, turns with."""
@@ -161,17 +162,12 @@ class RunningLine:
         """
         lead = max(settling, LEAD_SAMPLES / solver.sampling_rate)
         lead = math.ceil(lead * solver.sampling_rate) / solver.sampling_rate
-        angle, speed = self.course.nominal(np.array([-lead]))
-        phasor = np.exp(1j * self.linear.orders * (self.turned + float(angle[0])))
-        rates = 1j * self.linear.orders * float(speed[0]) * self.linear.angle
-        still = static_start(self.line, self.course, self.torques, time=-lead)
-        start = still + np.real(self.linear.angle @ phasor), np.real(rates @ phasor)
+        angle, rate = self.dynamics.vibration_at(-lead)
+        start = static_start(self.dynamics, time=-lead) + angle, rate
         while True:
             try:
                 return integrate_line(
-                    self.line,
-                    self.course,
-                    self.torques,
+                    self.dynamics,
                     solver,
                     duration=duration,
                     channels=channels,
@@ -220,15 +216,30 @@ def running_line(
     nominal = constant_speed(speed)
     if len(course.time) > 1:
         nominal = LineCourse(time=course.time, speed=course.speed)
+    system = _equations(
+        machine, matrices, governor, mesh_force, teeth or {}, turned, speed
+    )
+    reference = [
+        reference_force(machine, m, force)
+        for m, force in enumerate(mesh_force.tolist())
+    ]
+    dynamics = LineDynamics(
+        names=matrices.names,
+        system=system,
+        nominal=nominal,
+        torques=_torques(machine, matrices, course, turned, first),
+        friction_torque=_friction_torque(
+            machine, matrices, system, reference, teeth or {}
+        ),
+        reference_force=np.array(reference),
+        vibration=linear,
+        turned=turned,
+    )
     return RunningLine(
         machine=machine,
         matrices=matrices,
-        line=_geared(machine, matrices, governor, mesh_force, teeth or {}, turned),
-        course=nominal,
-        torques=_torques(machine, matrices, course, turned, first),
-        linear=linear,
+        dynamics=dynamics,
         mesh_force=mesh_force,
-        turned=turned,
         teeth=teeth or {},
     )
 
@@ -257,50 +268,50 @@ def reference_force(machine: EngineLine, number: int, force: float) -> float:
     return max(abs(force), machine.drive.line.meshes[number].stiffness * LEAST_APPROACH)
 
 
-def _geared(
+def _equations(
     machine: EngineLine,
     matrices: LineMatrices,
     governor: Governor,
     forces: Array,
     teeth: Mapping[int, MeshTeeth],
     turned: float,
-) -> GearedLine:
-    rotation = matrices.rigid[0]
-    momentum = matrices.mass @ rotation
+    speed: float,
+) -> Equations:
+    """Bodies, springs and meshes of a line; ``speed`` rad/s is that of the crank."""
+    rotation, mass = matrices.rigid[0], np.diag(matrices.mass)
+    momentum = mass * rotation
     rate = 2.0 * math.pi * governor.frequency
-    held = rate / math.sqrt(float(rotation @ momentum)) * momentum
-    slowed = 2.0 * governor.damping_ratio / rate
-    rigid, phases = np.outer(held, held), start_phases(machine.drive, turned)
-    meshes = tuple(
-        _mesh(machine, matrices, number, float(force), teeth.get(number), phase)
-        for number, (force, phase) in enumerate(zip(forces, phases, strict=True))
-    )
-    return GearedLine(
-        names=matrices.names,
-        mass=matrices.mass,
-        damping=matrices.damping + slowed * rigid,
-        stiffness=matrices.stiffness + rigid,
+    meshes = []
+    for number, phase in enumerate(start_phases(machine.drive, turned)):
+        of_mesh = teeth.get(number) or _even_teeth(machine, matrices, number, phase)
+        force = float(forces[number])
+        meshes.append(_mesh(machine, matrices, number, of_mesh, force, speed))
+    return Equations(
+        mass=mass,
+        stiffness=matrices.stiffness,
+        damping=matrices.damping,
         rotation=rotation,
-        held=held,
-        held_damping=slowed,
-        meshes=meshes,
-        friction_torque=_friction_torque(machine, matrices, meshes, forces, teeth),
+        held=rate / math.sqrt(float(rotation @ momentum)) * momentum,
+        held_damping=2.0 * governor.damping_ratio / rate,
+        meshes=tuple(meshes),
+        sources=(),
+        reference=int(np.argmin(np.abs(rotation - 1.0))),
+        angles=(),
     )
 
 
 def _friction_torque(
     machine: EngineLine,
     matrices: LineMatrices,
-    meshes: Sequence[LineMesh],
-    forces: Array,
+    system: Equations,
+    forces: Sequence[float],
     teeth: Mapping[int, MeshTeeth],
 ) -> Array:
     """Torques on the driving shafts that make up for the mean friction of all meshes, (dof,)."""
-    rotation, lost = matrices.rigid[0], 0.0
+    rotation, lost = system.rotation, 0.0
     for number, of_mesh in teeth.items():
-        force = reference_force(machine, number, float(forces[number]))
-        turning = float(rotation[meshes[number].roll_dof])
-        lost += of_mesh.friction_torque(force) * turning
+        turning = float(rotation[system.meshes[number].turn])
+        lost += of_mesh.friction_torque(forces[number]) * turning
     numbers, torques = machine.drive.numbers, np.zeros(len(rotation))
     driving = [_dof(matrices, numbers.index(n)) for n in machine.engine.driving_nodes]
     for dof in driving:
@@ -312,54 +323,67 @@ def _mesh(
     machine: EngineLine,
     matrices: LineMatrices,
     number: int,
+    teeth: MeshTeeth,
     force: float,
-    teeth: MeshTeeth | None,
-    phase: float,
-) -> LineMesh:
-    drive = machine.drive
-    pair, mesh = drive.pairs[number], drive.line.meshes[number]
-    reference = reference_force(machine, number, force)
-    common: dict[str, Any] = {
-        "name": machine.mesh_names[number],
-        "direction": matrices.directions[number],
-        "roll_dof": _dof(matrices, drive.line.gears[mesh.driving].node),
+    speed: float,
+) -> Mesh:
+    touched = np.array(_touched_dofs(machine, matrices, number))
+    is_there = touched != NONE
+    reach = np.where(is_there, matrices.directions[number][touched], 0.0)
+    damping = float(matrices.mesh_damping[number])
+    return Mesh(
+        name=machine.mesh_names[number],
+        teeth=teeth,
+        touched=touched,
+        reach=reach,
+        slide=_slide(reach, _turning_sense(machine, number)),
         # so many N s/m under the mean force; a mesh that carries less is damped less
-        "damping": float(matrices.mesh_damping[number]) / reference,
-    }
-    if teeth is None:
-        return even_mesh(
-            n_teeth=(pair.pinion.n_teeth, pair.wheel.n_teeth),
-            stiffness=float(matrices.mesh_stiffness[number]),
-            backlash=float(matrices.backlash[number]),
-            mirror=2.0 * pair.pitch_point / pair.base_pitch + 0.5,
-            start_phase=phase,
-            **common,
-        )
-    friction = mesh_friction(
-        teeth.table,
-        matrices.directions[number],
-        touched_dofs(machine, matrices, number),
-        matrices.rigid[0],
-        turning_sense(machine, number),
+        damping=damping / reference_force(machine, number, force),
+        mean_force=force,
+        speed=abs(float(matrices.rigid[0][touched[A_TURN]])) * speed,
     )
-    return toothed_mesh(teeth=teeth, friction=friction, **common)
 
 
-def touched_dofs(machine: EngineLine, matrices: LineMatrices, number: int) -> list[int]:
-    """Degrees of freedom of x, y and rotation of both gears of a mesh; -1: does not move so."""
+def _even_teeth(
+    machine: EngineLine, matrices: LineMatrices, number: int, phase: float
+) -> MeshTeeth:
+    """Teeth of the stiffness that the table of the meshes gives."""
+    pair = replace(
+        machine.drive.pairs[number], backlash=float(matrices.backlash[number])
+    )
+    table = even_table(pair, float(matrices.mesh_stiffness[number]))
+    return MeshTeeth.perfect(table, start_phase=phase)
+
+
+def _touched_dofs(
+    machine: EngineLine, matrices: LineMatrices, number: int
+) -> list[int]:
+    """Degrees of freedom of x, y and rotation of both gears of a mesh, ``NONE`` for none."""
     line, dofs = machine.drive.line, []
     mesh = line.meshes[number]
     for gear in (line.gears[mesh.driving], line.gears[mesh.driven]):
         for axis in "xy":
             name = f"{gear.name} {axis}"
-            dofs.append(-1)
+            dofs.append(NONE)
             if name in matrices.names:
                 dofs[-1] = matrices.names.index(name)
         dofs.append(_dof(matrices, gear.node))
     return dofs
 
 
-def turning_sense(machine: EngineLine, number: int) -> float:
+def _slide(reach: Array, sense: float) -> Array:
+    """Direction of the friction of a mesh along the motions of its gears, (motion,).
+
+    Where gear a turns against its frame (``sense`` -1), as in a gear pair, gear a feels it along
+    x, which is y turned back by a right angle. Where it turns from x to y, it is the other way.
+    """
+    slide = np.zeros(N_IN_PLANE)
+    for x, y in ((A_X, A_Y), (B_X, B_Y)):
+        slide[x], slide[y] = sense * reach[y], -sense * reach[x]
+    return slide
+
+
+def _turning_sense(machine: EngineLine, number: int) -> float:
     """1 where the driving gear of a mesh turns from x to y, else -1."""
     line = machine.drive.line
     gear = line.gears[line.meshes[number].driving]

@@ -19,12 +19,13 @@ from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.line_gears import gear_names, line_gears, line_meshes
 from gensig.driveline.mesh_phase import (
     first_slice_lead,
+    mesh_start,
     start_phases,
     start_rolls,
+    tooth_angle,
     tooth_angles,
 )
 from gensig.driveline.running import named_by_side, reference_force
-from gensig.driveline.time.line_mesh import mesh_start, tooth_angle
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.errors import ConfigError, FaultError, GeometryError
 from gensig.faults.base import Fault, faulty_teeth, require_gears

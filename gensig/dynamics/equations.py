@@ -44,6 +44,7 @@ class Mesh:
     speed : rad/s          of gear a at the set-point
     """
 
+    name: str
     teeth: MeshTeeth
     touched: NDArray[np.int64]
     reach: Array
@@ -57,11 +58,23 @@ class Mesh:
         moved = np.where(self.touched == NONE, 0.0, deflection[self.touched])
         return float(self.reach @ moved)
 
+    @property
+    def turn(self) -> int:
+        """Degree of freedom of the rotation of gear a."""
+        return int(self.touched[A_TURN])
+
     def push(self, n_dof: int) -> Array:
         """Gradient of the approach along all degrees of freedom, (dof,)."""
+        return self._along(self.reach, n_dof)
+
+    def rub(self, n_dof: int) -> Array:
+        """Direction of the friction along all degrees of freedom, (dof,)."""
+        return self._along(self.slide, n_dof)
+
+    def _along(self, values: Array, n_dof: int) -> Array:
         direction = np.zeros(n_dof)
         is_there = self.touched != NONE
-        direction[self.touched[is_there]] = self.reach[is_there]
+        direction[self.touched[is_there]] = values[is_there]
         return direction
 
 
@@ -107,7 +120,7 @@ class Equations:
     held_damping : s     its damping is so many times its stiffness
     sources : torques and forces over an angle
     elements : further forces between bodies
-    reference : degree of freedom whose rotation is 1
+    reference : degree of freedom that turns with the reference
     angles : degrees of freedom whose angles are given out
     """
 
@@ -123,11 +136,20 @@ class Equations:
     angles: tuple[int, ...]
     elements: tuple[Element, ...] = ()
 
+    @property
+    def governed_stiffness(self) -> Array:
+        """Stiffness with that of the governor, (dof, dof)."""
+        return self.stiffness + np.outer(self.held, self.held)
+
+    @property
+    def governed_damping(self) -> Array:
+        """Damping with that of the governor, (dof, dof)."""
+        return self.damping + self.held_damping * np.outer(self.held, self.held)
+
     def rates(self, mesh_stiffness: Array) -> NDArray[np.complex128]:
         """Eigenvalues in 1/s with every mesh held at a stiffness in N/m, (mesh,)."""
-        n, rigid = len(self.mass), np.outer(self.held, self.held)
-        stiffness = self.stiffness + rigid
-        damping = self.damping + self.held_damping * rigid
+        n, damping = len(self.mass), self.governed_damping
+        stiffness = self.governed_stiffness
         for mesh, held in zip(self.meshes, mesh_stiffness.tolist(), strict=True):
             along = mesh.push(n)
             stiffness = stiffness + held * np.outer(along, along)

@@ -149,7 +149,7 @@ def _exact_numbers(teeth: MeshTeeth) -> tuple[float, ...]:
         pair.pinion.base_radius,
         pair.base_pitch,
         1.0 / pair.base_pitch,
-        options.points_per_pitch / pair.base_pitch,
+        teeth.table.nodes_per_pitch / pair.base_pitch,
         teeth.start_roll,
         *near,
         pitches(teeth.table)[0] * pair.base_pitch,
@@ -159,22 +159,11 @@ def _exact_numbers(teeth: MeshTeeth) -> tuple[float, ...]:
 def near_positions(teeth: MeshTeeth) -> tuple[float, float]:
     """Positions s outside of which no pair comes within ``FAR_NEAR`` of touching, m."""
     position = teeth.table.position
-    near = np.flatnonzero(nearest_gaps(teeth) < FAR_NEAR)
+    near = np.flatnonzero(teeth.nearest_gaps < FAR_NEAR)
     first, last = 0, len(position) - 1
     if len(near) > 0:  # else every pair may be as near as any other
         first, last = max(near[0] - 1, first), min(near[-1] + 1, last)
     return float(position[first]), float(position[last])
-
-
-def nearest_gaps(teeth: MeshTeeth) -> Array:
-    """No less than these are the gaps of any pair of teeth, with their errors, (node,) m."""
-    table = teeth.table
-    beyond = table.position - table.pair.pitch_point - table.half_lag
-    nearest = table.first_touch
-    for error, tilt in zip(teeth.errors, teeth.tilts, strict=True):
-        tilted = np.minimum(tilt.min() * beyond, tilt.max() * beyond)
-        nearest = nearest + error.min() + tilted
-    return nearest
 
 
 def _mesh_indices(

@@ -86,6 +86,17 @@ class MeshTeeth:
         return static_mesh(self.table, states, force)
 
     @property
+    def nearest_gaps(self) -> Array:
+        """No less than these are the gaps of any pair of teeth, with their errors, (node,) m."""
+        table = self.table
+        beyond = table.position - table.pair.pitch_point - table.half_lag
+        nearest = table.first_touch
+        for error, tilt in zip(self.errors, self.tilts, strict=True):
+            tilted = np.minimum(tilt.min() * beyond, tilt.max() * beyond)
+            nearest = nearest + error.min() + tilted
+        return nearest
+
+    @property
     def meeting(self) -> Meeting:
         """Start teeth and errors, for statics."""
         return Meeting(

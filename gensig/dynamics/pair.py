@@ -335,6 +335,7 @@ class PairDynamics(Dynamics):
         slide = np.zeros(n_touched)
         slide[: len(PAIR_SLIDE)] = PAIR_SLIDE
         mesh = Mesh(
+            name="pinion-wheel",
             teeth=self.teeth,
             touched=np.arange(n_touched),
             reach=self.approach_direction()[:n_touched],

@@ -57,8 +57,8 @@ class ToothTable:
 
     Parameters
     ----------
-    position : (node,) m      of the contact, of sliced teeth of the slice that enters first;
-        ``points_per_pitch`` to a base pitch, from ``first_pitch`` on
+    position : (node,) m      of the contact, of sliced teeth of the slice that enters first; at
+        equal distances from ``first_pitch`` to ``last_pitch``
     first_pitch, last_pitch : whole base pitches; their difference is the pairs at once
     depth : (chord,) m        beginning with 0
     pinion, wheel : kinds of the teeth
@@ -83,6 +83,11 @@ class ToothTable:
     def n_pairs(self) -> int:
         """Pairs of teeth that are looked at together."""
         return self.last_pitch - self.first_pitch
+
+    @property
+    def nodes_per_pitch(self) -> int:
+        """Cells between the nodes of a base pitch."""
+        return (len(self.position) - 1) // self.n_pairs
 
     @property
     def is_separable(self) -> bool:

@@ -17,7 +17,6 @@ from gensig.dynamics.integrator import (
     Solver,
     check_machine,
 )
-from gensig.dynamics.lanes import nearest_gaps
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.pair import PairDynamics
 from gensig.errors import SimulationError, StepError
@@ -149,7 +148,7 @@ def not_finite(run: Run[MachineT], meshes: Sequence[MeshTeeth]) -> StepError:
         return StepError(f"{failed}; {remedy}")
     for mesh in meshes:
         backlash_um = from_si("backlash_um", mesh.pair.backlash)
-        overlap_um = -from_si("gap_um", float(nearest_gaps(mesh).min()))
+        overlap_um = -from_si("gap_um", float(mesh.nearest_gaps.min()))
         if overlap_um > backlash_um:
             return StepError(
                 f"{failed}: teeth stand out by up to {overlap_um:.3g} um along the line of "

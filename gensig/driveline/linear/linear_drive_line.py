@@ -42,14 +42,14 @@ class LinearDriveLine(LinearMachine):
     @cached_property
     def closed(self) -> LinearLine:
         """The line with a spring and a damper in every mesh, losses viscous."""
-        matrices, line = self.running.matrices, self.running.line
+        matrices, system = self.running.matrices, self.running.dynamics.system
         across = matrices.directions.T
         return LinearLine(
-            mass=line.mass,
-            stiffness=line.stiffness
+            mass=np.diag(system.mass),
+            stiffness=system.governed_stiffness
             + (across * matrices.mesh_stiffness) @ matrices.directions,
             loss=matrices.loss_stiffness,
-            damping=line.damping
+            damping=system.governed_damping
             + (across * matrices.mesh_damping) @ matrices.directions,
         )
 

@@ -37,7 +37,7 @@ def line_mesh_state(
 
 def angle_channels(running: RunningLine) -> list[tuple[str, int]]:
     """Channels of a motion that ``line_mesh_states`` needs: angles of all driving gears."""
-    return [("angle", mesh.roll_dof) for mesh in running.line.meshes]
+    return [("angle", mesh.turn) for mesh in running.dynamics.system.meshes]
 
 
 def line_mesh_states(
@@ -50,7 +50,7 @@ def line_mesh_states(
     """
     states = []
     for m, channel in enumerate(angle_channels(running)):
-        nominal = running.line.rotation[channel[1]] * motion.nominal_angle
+        nominal = running.dynamics.system.rotation[channel[1]] * motion.nominal_angle
         if m in running.teeth:
             angle = nominal + motion.signals[channel]
             seen = motion.seen[m]

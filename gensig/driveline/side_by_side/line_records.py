@@ -9,15 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.driveline.side_by_side.line_dynamics import (
-    LineDynamics,
-    line_dynamics,
-)
+from gensig.driveline.running import RunningLine
 from gensig.driveline.side_by_side.line_mesh_states import line_mesh_state
+from gensig.driveline.time.line_dynamics import LineDynamics
 from gensig.dynamics.backends.base import N_SEEN, Integration, Motions
 from gensig.dynamics.backends.nystroem.machine_lanes import group_kind
 from gensig.dynamics.backends.registry import BACKENDS, EXPLICIT_BACKEND
-from gensig.dynamics.equations import A_TURN
 from gensig.dynamics.mesh_state import MeshState
 from gensig.errors import SimulationError
 from gensig.systems.integration_checks import (
@@ -52,19 +49,25 @@ def simulate_lines(runs: Sequence[LineRun]) -> list[CleanRecord | SimulationErro
     machine that the core does not cover, gives its error in place of its record.
     """
     return records_by_kind(
-        runs, dynamics_of=_checked_dynamics, kind_of=_kind, integrate=_together
+        runs, dynamics_of=_checked_line, kind_of=_kind, integrate=_together
     )
 
 
-def _checked_dynamics(run: LineRun) -> LineDynamics:
-    line = dynamics_of(run)
+def _checked_line(run: LineRun) -> RunningLine:
+    line = running_line_of(run)
+    for number, mesh in enumerate(line.dynamics.system.meshes):
+        if number not in line.teeth:
+            raise SimulationError(
+                "solver.backend = nystroem takes meshes of tabulated teeth, but mesh "
+                f"{mesh.name} has none; take solver.backend=newmark"
+            )
     per_sample = run.system.solver.oversampling
-    BACKENDS[EXPLICIT_BACKEND].check_step(line, _rate(run), per_sample)
+    BACKENDS[EXPLICIT_BACKEND].check_step(line.dynamics, _rate(run), per_sample)
     return line
 
 
-def dynamics_of(run: LineRun) -> LineDynamics:
-    """The motion of one run; its first angle is that of the followed mesh's driving gear.
+def running_line_of(run: LineRun) -> RunningLine:
+    """The line of one run; its first angle is that of the followed mesh's driving gear.
 
     Where the run asks for the loads of the teeth, the driving gears of all meshes are among them.
     """
@@ -74,16 +77,18 @@ def dynamics_of(run: LineRun) -> LineDynamics:
     if run.with_mesh_state:
         nodes = [line.gears[mesh.driving].node for mesh in line.meshes]
         turned += [engine.drive.numbers[node] for node in nodes]
-    return line_dynamics(machine.line(run), angles=turned)
+    running: RunningLine = machine.line(run)
+    return running.with_angles(turned)
 
 
 def _rate(run: LineRun) -> float:
     return float(run.system.sensing.sampling_rate)
 
 
-def _kind(run: LineRun, line: LineDynamics) -> tuple[object, ...]:
+def _kind(run: LineRun, running: RunningLine) -> tuple[object, ...]:
     """All values that runs must share to be integrated in one call."""
-    machine = run.system
+    machine, line = run.system, running.dynamics
+    touched = [tuple(mesh.touched) for mesh in line.system.meshes]
     return (
         machine.sensing.sampling_rate,
         machine.sensing.channels,
@@ -94,34 +99,37 @@ def _kind(run: LineRun, line: LineDynamics) -> tuple[object, ...]:
         machine.solver,
         machine.mesh.roll_torque,
         line.dofs,
-        line.touched.tobytes(),
+        tuple(touched),
         group_kind(line.equations),
-        line.angles,
+        line.system.angles,
         tuple(source.dof for source in line.sources),
     )
 
 
 def _together(
-    runs: Sequence[LineRun], machines: Sequence[LineDynamics]
+    runs: Sequence[LineRun], lines: Sequence[RunningLine]
 ) -> list[CleanRecord | SimulationError]:
-    machine, first = runs[0].system, machines[0]
+    machine, first = runs[0].system, lines[0].dynamics
     rate, solver = _rate(runs[0]), machine.solver
-    kinds = machine.signals(first.running)
+    kinds = machine.signals(lines[0])
     dofs = [dof for kind, dof in kinds if kind == "acceleration"]
     integration = Integration(
         sampling_rate=rate,
         duration=machine.operating.duration,
         # a line without an acceleration has one all the same, by which its steps are checked
-        channels=tuple(first.dofs[dof] for dof in dofs or [first.angles[0]]),
+        channels=tuple(first.dofs[dof] for dof in dofs or [first.system.angles[0]]),
         with_mesh_state=runs[0].with_mesh_state,
         oversampling=solver.oversampling,
         precision=solver.precision,
         max_error=solver.max_error,
     )
-    motions = BACKENDS[EXPLICIT_BACKEND].integrate(machines, integration)
+    motions = BACKENDS[EXPLICIT_BACKEND].integrate(
+        [line.dynamics for line in lines], integration
+    )
     errors, verdicts = checks(motions, solver, rate)
     records: list[CleanRecord | SimulationError] = []
-    for index, (run, line) in enumerate(zip(runs, machines, strict=True)):
+    for index, (run, running) in enumerate(zip(runs, lines, strict=True)):
+        line = running.dynamics
         if not motions.finite[index]:
             records.append(not_finite(run, line.teeth))
             continue
@@ -133,7 +141,7 @@ def _together(
             mesh = further.pop(number)
         records.append(
             CleanRecord(
-                acceleration=run.system.rows(run, line.running, signals),
+                acceleration=run.system.rows(run, running, signals),
                 shaft_angle=motions.angle[index][0],
                 mean_speed=float(motions.mean_speed[index]),
                 contact_loss_fraction=float(motions.contact_loss[index, number]),
@@ -151,10 +159,10 @@ def _mesh_states(
 ) -> list[MeshState]:
     """Loads of the teeth of all meshes in one of some motions."""
     states = []
-    for m, teeth in enumerate(line.teeth):
+    for m, mesh in enumerate(line.system.meshes):
         seen = motions.seen[index][m * N_SEEN : (m + 1) * N_SEEN]
-        angle = motions.angle[index][line.angles.index(line.touched[m, A_TURN])]
-        states.append(line_mesh_state(run, teeth, m, seen, angle))
+        angle = motions.angle[index][line.system.angles.index(mesh.turn)]
+        states.append(line_mesh_state(run, mesh.teeth, m, seen, angle))
     return states
 
 
@@ -164,13 +172,13 @@ def _signals(
     """Signals of one of some motions by channel; angles are deviations."""
     angles = motions.angle[index]
     times = np.arange(angles.shape[1]) / rate
-    nominal_angle, nominal_speed = line.running.course.nominal(times)
-    rotation = line.running.line.rotation
+    nominal_angle, nominal_speed = line.course(times)
+    rotation = line.system.rotation
     signals: dict[Channel, Array] = {
         ("acceleration", dof): motions.acceleration[index][row]
         for row, dof in enumerate(dofs)
     }
-    for dof, angle in zip(line.angles, angles, strict=True):
+    for dof, angle in zip(line.system.angles, angles, strict=True):
         signals["angle", dof] = angle - rotation[dof] * nominal_angle
     return LineSignals(
         signals=signals, nominal_angle=nominal_angle, nominal_speed=nominal_speed

@@ -122,15 +122,16 @@ class Meshes(NamedTuple):
 
 
 class Torques(NamedTuple):
-    """Torques on single degrees of freedom: ``dof`` (torque,), ``first`` (torque + 1,) nodes of
-    each in ``table``.
+    """Torques and forces on degrees of freedom: ``steady`` (knot, dof), and those over an angle.
 
-    Torque i is its table over the angle of its own degree of freedom, ``per_rad[i]`` nodes a
-    radian from ``shift[i]`` nodes on, times ``factor`` (torque, knot). One node alone is a torque
-    that only the factor changes.
+    Source i acts on ``dof`` (source,) with its ``table`` from ``first`` (source + 1,) on. It
+    follows the angle of ``turned_by`` (source,), ``per_rad[i]`` nodes a radian from ``shift[i]``
+    nodes on, times ``factor`` (source, knot).
     """
 
+    steady: Any
     dof: Any
+    turned_by: Any
     first: Any
     table: Any
     per_rad: Any
@@ -155,8 +156,7 @@ class Line(NamedTuple):
 
     ``direction`` are the gradients of the approaches as rows; ``answer`` (mesh, dof) what one
     newton of a mesh moves, ``compliance`` (mesh, mesh) what it takes from the approaches.
-    ``rubbing`` has three rows a mesh, along which its friction and both moments act; ``given``
-    (dof,) are constant torques that make up for the mean of it.
+    ``rubbing`` has three rows a mesh, along which its friction and both moments act.
     ``rotation`` (dof,) is the nominal rotation of each per that of the reference, ``carried`` M
     times it.
     """
@@ -166,7 +166,6 @@ class Line(NamedTuple):
     stiffness: Padded
     direction: Rows
     rubbing: Rows
-    given: Any
     factor: Factor
     answer: Any
     compliance: Any

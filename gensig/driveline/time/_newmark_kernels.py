@@ -172,26 +172,24 @@ def push(line, torques, angle, gain, knot, share, q, force):
     """Torques at an instant, and the inertia force of the nominal acceleration, into ``force``
     (dof,).
     """
+    steady, factor = torques.steady, torques.factor
     for i in range(len(force)):
-        force[i] = line.given[i] - gain * line.carried[i]
-    for j in range(len(torques.dof)):
-        dof, first = torques.dof[j], torques.first[j]
-        n_nodes = torques.first[j + 1] - first
-        value = torques.table[first]
-        if n_nodes > 1:
-            x = (line.rotation[dof] * angle + q[dof]) * torques.per_rad[
-                j
-            ] + torques.shift[j]
-            x -= math.floor(x / n_nodes) * n_nodes
-            node = min(int(x), n_nodes - 1)
-            low = torques.table[first + node]
-            value = low + (x - node) * (
-                torques.table[first + (node + 1) % n_nodes] - low
-            )
-        factor = torques.factor[j, knot]
+        force[i] = steady[knot, i] - gain * line.carried[i]
         if share > 0.0:
-            factor += share * (torques.factor[j, knot + 1] - factor)
-        force[dof] += factor * value
+            force[i] += share * (steady[knot + 1, i] - steady[knot, i])
+    for j in range(len(torques.dof)):
+        turning, first = torques.turned_by[j], torques.first[j]
+        n_nodes = torques.first[j + 1] - first
+        turned = line.rotation[turning] * angle + q[turning]
+        x = turned * torques.per_rad[j] + torques.shift[j]
+        x -= math.floor(x / n_nodes) * n_nodes
+        node = min(int(x), n_nodes - 1)
+        low = torques.table[first + node]
+        rise = torques.table[first + (node + 1) % n_nodes] - low
+        share_of_source = factor[j, knot]
+        if share > 0.0:
+            share_of_source += share * (factor[j, knot + 1] - share_of_source)
+        force[torques.dof[j]] += share_of_source * (low + (x - node) * rise)
 
 
 @compiled

@@ -17,16 +17,17 @@ from gensig.driveline.time import _layout as layout
 from gensig.driveline.time import _newmark_kernels as kernels
 from gensig.driveline.time._layout import Work
 from gensig.driveline.time._scheme import NEWMARK
-from gensig.driveline.time.course import LineCourse, ShaftTorque
-from gensig.driveline.time.geared_line import (
-    GearedLine,
+from gensig.driveline.time.line_arrays import (
     elimination_order,
     pack_line,
     pack_meshes,
     pack_torques,
 )
+from gensig.driveline.time.line_dynamics import LineDynamics
+from gensig.driveline.time.line_statics import balanced, is_free
 from gensig.dynamics.backends.base import N_SEEN
 from gensig.dynamics.decimation import decimator
+from gensig.dynamics.equations import Equations
 from gensig.errors import ConfigError, SimulationError, StepError
 
 Array = NDArray[np.float64]
@@ -104,9 +105,7 @@ class LineMotion:
 
 
 def integrate_line(
-    line: GearedLine,
-    course: LineCourse,
-    torques: Sequence[ShaftTorque],
+    line: LineDynamics,
     solver: LineSolver,
     *,
     duration: float,
@@ -148,18 +147,18 @@ def integrate_line(
                 f"line: start must be finite deviations and rates, ({n},) each"
             )
     step, low_pass = solver.step, decimator(solver.oversampling)
-    _check_step(line, course, step)
+    _check_step(line, step)
     first_sample = -max(low_pass.margin + 1, math.ceil(lead_in * solver.sampling_rate))
     if start is None:
         begin = first_sample / solver.sampling_rate
-        start = static_start(line, course, torques, time=begin), np.zeros(n)
-    run = _Run(line, course, torques, solver, start, channels)
+        start = static_start(line, time=begin), np.zeros(n)
+    run = _Run(line, solver, start, channels)
     if with_pairs:
-        run.seen = np.zeros((n_samples, len(line.meshes), N_SEEN))
+        run.seen = np.zeros((n_samples, len(line.system.meshes), N_SEEN))
     run.begin(first_sample * solver.oversampling)
     run.skip((-low_pass.margin - first_sample) * solver.oversampling - 1)
     signals = run.record(n_samples)
-    angle, speed = course.nominal(np.arange(n_samples) / solver.sampling_rate)
+    angle, speed = line.nominal.nominal(np.arange(n_samples) / solver.sampling_rate)
     motion = run.motion(signals, angle, speed)
     _check_balance(motion.energy_residual, solver)
     return motion
@@ -180,13 +179,7 @@ def _rounded_above(value: float, limit: float) -> str:
     return next((text for text in texts if float(text) > limit), f"{value:.3g}")
 
 
-def static_start(
-    line: GearedLine,
-    course: LineCourse,
-    torques: Sequence[ShaftTorque],
-    *,
-    time: float = 0.0,
-) -> Array:
+def static_start(line: LineDynamics, *, time: float = 0.0) -> Array:
     """Deviations at which the line turns without vibrating under its mean torques at a time,
     (dof,).
 
@@ -198,23 +191,17 @@ def static_start(
     ------
     SimulationError    where it does not come to rest
     """
-    order = elimination_order(line)
+    system = line.system
+    order = elimination_order(system)
     still = pack_line(line, order, STILL, 0.0, "at rest")
-    still = still._replace(given=np.zeros(len(order)))
-    meshes = pack_meshes(line, order)
-    pushed = pack_torques(line, order, torques, course)
-    means = np.array([torque.table.mean() for torque in torques])
-    pushed = pushed._replace(first=np.arange(len(torques) + 1), table=means)
-    angle, _, gain, knot, share = kernels.nominal(course.knots, time, 0)
-    q, force = np.zeros((2, len(order)))
-    kernels.push(still, pushed, angle, gain, knot, share, q, force)
-    free = line.rotation @ line.stiffness @ line.rotation
-    size = np.abs(line.rotation)
-    if free <= 1e-12 * float(size @ np.abs(line.stiffness) @ size):
-        unbalanced = still.carried * (force @ still.rotation)
-        force -= unbalanced / (still.carried @ still.rotation)
-    law = np.zeros((len(line.meshes), layout.N_LAW))
-    if kernels.rest(still, meshes, force, angle, q, law, _scratch(line)) < 0:
+    meshes = pack_meshes(system, order)
+    angle = float(line.nominal.nominal(np.array([time]))[0][0])
+    force = line.mean_forces(time)
+    if is_free(system):
+        force = balanced(system, force)
+    q, law = np.zeros(len(order)), np.zeros((len(system.meshes), layout.N_LAW))
+    given = still, meshes, force[order], angle, q, law, _scratch(system)
+    if kernels.rest(*given) < 0:
         raise SimulationError(
             "line: it does not come to rest under its mean torques; give a start, or "
             "check torques and springs"
@@ -227,16 +214,15 @@ class _Run:
 
     def __init__(
         self,
-        line: GearedLine,
-        course: LineCourse,
-        torques: Sequence[ShaftTorque],
+        line: LineDynamics,
         solver: LineSolver,
         start: tuple[Array, Array],
         channels: Sequence[tuple[str, int]],
     ) -> None:
-        self.line, self.course, self.solver = line, course.knots, solver
+        self.line, self.course, self.solver = line, line.nominal.knots, solver
         self.channels = tuple(channels)
-        self.order = elimination_order(line)
+        self.order = elimination_order(line.system)
+        n_meshes = len(line.system.meshes)
         at_of, step = np.argsort(self.order), solver.step
         self.packed = pack_line(
             line,
@@ -245,14 +231,14 @@ class _Run:
             NEWMARK.damping / step,
             f"with a step of {step:.3g} s",
         )
-        self.meshes = pack_meshes(line, self.order)
-        self.torques = pack_torques(line, self.order, torques, course)
-        self.law, self.work = np.zeros((len(line.meshes), layout.N_LAW)), _scratch(line)
+        self.meshes = pack_meshes(line.system, self.order)
+        self.torques = pack_torques(line, self.order)
+        self.law, self.work = np.zeros((n_meshes, layout.N_LAW)), _scratch(line.system)
         q, v = (np.array(part[self.order], dtype=np.float64) for part in start)
         mean, force = np.zeros((2, len(q)))
-        approach, rate = np.zeros((2, len(line.meshes)))
+        approach, rate = np.zeros((2, n_meshes))
         self.state = q, v, mean, force, approach, rate, self.law
-        self.tally = np.zeros((len(line.meshes), layout.N_TALLY))
+        self.tally = np.zeros((n_meshes, layout.N_TALLY))
         self.sums = np.zeros(layout.N_SUMS)
         self.chosen = np.empty((len(channels), 2), dtype=np.int64)
         for row, (kind, number) in zip(self.chosen, channels, strict=True):
@@ -260,7 +246,7 @@ class _Run:
             if kind != "mesh_force":
                 row[1] = at_of[number]
         self.step_index, self.n_steps, self.energy = 0, 0, 0.0
-        self.seen = np.zeros((0, len(line.meshes), N_SEEN))
+        self.seen = np.zeros((0, n_meshes, N_SEEN))
 
     def begin(self, step_index: int) -> None:
         """Look at the start, ``step_index`` steps from time 0."""
@@ -362,10 +348,11 @@ class _Run:
         )
 
 
-def _scratch(line: GearedLine) -> Work:
-    n, m = len(line.names), len(line.meshes)
-    most = max([1, *[mesh.n_pairs for mesh in line.meshes]])
-    most_springs = max([1, *[len(mesh.depth) for mesh in line.meshes]])
+def _scratch(system: Equations) -> Work:
+    n, m = len(system.mass), len(system.meshes)
+    tables = [mesh.teeth.table for mesh in system.meshes]
+    most = max([1, *[table.n_pairs for table in tables]])
+    most_springs = max([1, *[len(table.depth) for table in tables]])
     n_columns = layout.STIFFNESS + layout.PER_SPRING * most_springs + layout.N_BEHIND
     return Work._make(
         [
@@ -379,23 +366,24 @@ def _scratch(line: GearedLine) -> Work:
     )
 
 
-def _check_channels(line: GearedLine, channels: Sequence[tuple[str, int]]) -> None:
+def _check_channels(line: LineDynamics, channels: Sequence[tuple[str, int]]) -> None:
     if not channels:
         raise ConfigError("line: no channel to give out; name at least one")
     for kind, i in channels:
         n = len(line.names)
         if kind == "mesh_force":
-            n = len(line.meshes)
+            n = len(line.system.meshes)
         if kind not in KINDS or not 0 <= i < n:
             raise ConfigError(
                 f"line: no channel ({kind!r}, {i}); allowed: {', '.join(KINDS)} of 0..{n - 1}"
             )
 
 
-def _check_step(line: GearedLine, course: LineCourse, step: float) -> None:
-    for mesh in line.meshes:
-        pitches_per_rad = mesh.n_teeth[0] * abs(float(line.rotation[mesh.roll_dof]))
-        rate = pitches_per_rad / (2.0 * math.pi) * course.speed.max()
+def _check_step(line: LineDynamics, step: float) -> None:
+    for mesh in line.system.meshes:
+        turning = abs(float(line.system.rotation[mesh.turn]))
+        pitches_per_rad = mesh.teeth.pair.pinion.n_teeth * turning / (2.0 * math.pi)
+        rate = pitches_per_rad * line.nominal.speed.max()
         if rate * step > LONGEST_STEP:
             raise StepError(
                 f"mesh '{mesh.name}' rolls {rate * step:.2g} pitches in a step, its "

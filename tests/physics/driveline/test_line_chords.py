@@ -10,19 +10,10 @@ import pytest
 from chord_tables import Slices, as_chords, repeated, with_table
 from closeness import assert_close
 from lane_tools import advance
-from line_tools import (
-    constant_torques,
-    law_at,
-    pair_friction,
-    pair_line,
-    state_after,
-)
+from line_tools import law_at, pair_line, state_after, turning_mesh
 
 from gensig.driveline.time import _layout as layout
-from gensig.driveline.time.course import constant_speed
-from gensig.driveline.time.toothed_mesh import toothed_mesh
 from gensig.dynamics.mesh_teeth import MeshTeeth
-from gensig.errors import ConfigError
 from gensig.faults.broken import MissingTooth
 from gensig.mesh.load_distribution import Meeting, pair_states, static_mesh
 from gensig.mesh.tooth_table import GearTeeth
@@ -37,10 +28,13 @@ N_SAMPLES = 205
 
 
 def placed(table, **more):
-    pair = table.pair
-    direction = np.array([pair.pinion.base_radius, -pair.wheel.base_radius])
-    teeth = replace(MeshTeeth.perfect(table), **more)
-    return toothed_mesh("m", teeth, direction=direction, roll_dof=0, damping=DAMPING)
+    return turning_mesh(replace(MeshTeeth.perfect(table), **more), DAMPING)
+
+
+def with_table_of(mesh, **changes):
+    """The mesh with another table of its teeth."""
+    table = replace(mesh.teeth.table, **changes)
+    return replace(mesh, teeth=replace(mesh.teeth, table=table))
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +65,7 @@ class TestLaw:
         """
         table, force = helical
         rolls = np.linspace(0.05, 30.05, 61)
-        meeting = Meeting(errors=mesh.errors)
+        meeting = Meeting(errors=mesh.teeth.errors)
         computed = static_mesh(
             table,
             pair_states(table, rolls * table.pair.base_pitch, meeting),
@@ -89,7 +83,8 @@ class TestLaw:
     def test_force_and_torque_of_the_passing_teeth_are_slopes_of_one_potential(
         self, mesh, approach, turned
     ):
-        mesh = replace(mesh, backlash=1e-4)
+        pair = replace(mesh.teeth.pair, backlash=1e-4)
+        mesh = with_table_of(mesh, pair=pair)
 
         def stored(turned, approach):
             return law_at(mesh, turned, approach)[layout.STORED]
@@ -118,14 +113,11 @@ class TestLaw:
         self, helical, mesh
     ):
         n_teeth = helical[0].pair.pinion.n_teeth
-        rows = np.maximum(mesh.rows, 0)
-        sound = replace(
-            mesh,
-            rows=rows,
-            coast_rows=np.zeros_like(mesh.coast_rows),
-        )
+        pinion = mesh.teeth.table.pinion
+        whole = replace(pinion, present=np.ones_like(pinion.present))
+        sound = with_table_of(mesh, pinion=whole)
         turned = np.arange(0.5, n_teeth + 0.5, 0.25)
-        for approach in (3e-5, -mesh.backlash - 3e-5):
+        for approach in (3e-5, -mesh.teeth.pair.backlash - 3e-5):
             force, whole = (
                 np.array([law_at(each, at, approach)[0] for at in turned])
                 for each in (mesh, sound)
@@ -147,15 +139,9 @@ class TestLaw:
         middle = 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
         start = (pair.pitch_point + middle) / pair.base_pitch + 9.0
         front = law_at(mesh, start + position, 3e-5)[0]
-        back = law_at(mesh, start + 0.5 - position, -mesh.backlash - 3e-5)[0]
+        back = law_at(mesh, start + 0.5 - position, -pair.backlash - 3e-5)[0]
 
         assert_close(back, -front, 1e-9)
-
-    def test_springs_begin_at_0_and_grow(self, mesh):
-        with pytest.raises(ConfigError, match="must begin at 0 and grow"):
-            replace(mesh, depth=mesh.depth[::-1])
-        with pytest.raises(ConfigError, match="springs a row"):
-            replace(mesh, depth=mesh.depth[:-1])
 
 
 class TestZeroHelix:
@@ -165,7 +151,7 @@ class TestZeroHelix:
         one = placed(table)
         other = placed(as_chords(table, n_chords))
         for turned in (0.2, 1.7, 2.4, 23.9):
-            for approach in (1e-5, 4e-5, -one.backlash - 2e-5):
+            for approach in (1e-5, 4e-5, -table.pair.backlash - 2e-5):
                 expected = law_at(one, turned, approach, 1e-2, 1e3)
                 assert_close(
                     law_at(other, turned, approach, 1e-2, 1e3),
@@ -186,8 +172,6 @@ def moved(line, dynamics):
         start,
         n_steps / (51200 * STEPS),
         n_steps,
-        torques=constant_torques(dynamics.system().force),
-        course=constant_speed(dynamics.operating.speed),
     )
 
 
@@ -216,15 +200,7 @@ class TestAgainstThePair:
         return with_table(dynamics_of(spur, (), **errors), table)
 
     def test_the_same_motion(self, dynamics):
-        mesh = toothed_mesh(
-            "pair",
-            dynamics.teeth,
-            direction=dynamics.approach_direction(),
-            roll_dof=2,
-            damping=dynamics.mesh_damping / dynamics.mesh_force,
-            friction=pair_friction(dynamics),
-        )
-        q_1, v_1, motion = moved(pair_line(dynamics, mesh), dynamics)
+        q_1, v_1, motion = moved(pair_line(dynamics), dynamics)
         start = (
             dynamics.static_start(0.0),
             np.zeros(len(dynamics.dofs)),

@@ -46,7 +46,8 @@ def machine(*words):
 
 def line_with(fault, *words):
     record = machine(*words)
-    return record, record.line(Run(system=record, faults=read_faults(fault))).line
+    line = record.line(Run(system=record, faults=read_faults(fault)))
+    return record, line.dynamics
 
 
 def simulated(record, *faults):
@@ -84,8 +85,8 @@ def running(lateral, teeth):
 @pytest.mark.parametrize("lateral", ["false", "true"])
 def test_tabulated_teeth_part_and_energies_balance(lateral):
     line, motion, _ = running(lateral, "sliced")
-    for mesh, pair in zip(line.line.meshes, line.machine.drive.pairs, strict=True):
-        assert (len(mesh.depth) > 1) == (pair.pinion.helix_angle != 0.0)
+    for mesh, pair in zip(line.dynamics.teeth, line.machine.drive.pairs, strict=True):
+        assert (len(mesh.table.depth) > 1) == (pair.pinion.helix_angle != 0.0)
     assert motion.energy_residual < 1e-3
     assert (motion.contact_loss > 0.1).sum() >= 4
 
@@ -94,7 +95,7 @@ def test_the_flywheel_hardly_feels_constant_stiffness():
     (line, motion, _), (_, sliced, _) = (
         running("false", teeth) for teeth in ("constant", "sliced")
     )
-    assert all(len(mesh.depth) == 1 for mesh in line.line.meshes)
+    assert all(len(teeth.table.depth) == 1 for teeth in line.dynamics.teeth)
 
     speed = motion.signals["speed", line.dof(14)]
     change = np.std(speed - sliced.signals["speed", line.dof(14)]) / np.std(speed)
@@ -159,13 +160,13 @@ def test_the_faulty_tooth_is_on_its_gear_in_all_its_meshes_and_nowhere_else(
     }
 
     odd = set()
-    for name, one in zip(names, line.meshes, strict=True):
-        for side, kinds in enumerate(one.kinds):
-            teeth = np.flatnonzero(kinds != np.bincount(kinds).argmax())
-            if len(teeth):
-                assert teeth.tolist() == [10]
+    for name, teeth in zip(names, line.teeth, strict=True):
+        for side, gear_teeth in enumerate((teeth.table.pinion, teeth.table.wheel)):
+            others = np.flatnonzero(gear_teeth.kind != gear_teeth.commonest)
+            if len(others):
+                assert others.tolist() == [10]
                 odd.add((name, side))
-        assert (one.rows == -1).any() == (name in dict(expected))
+        assert (not teeth.table.present.all()) == (name in dict(expected))
 
     assert odd == expected
 
@@ -201,8 +202,8 @@ def test_pits_stay_on_their_flank_and_cracks_are_felt_from_behind(kind, same, ot
             **faults[kind],
         }
         record, line = line_with(fault, "system.record_mesh=[3,66]")
-        mesh = line.meshes[record.engine.mesh_names.index(name)]
-        assert mesh.kinds[0].any() == expected
+        teeth = line.teeth[record.engine.mesh_names.index(name)]
+        assert teeth.table.pinion.kind.any() == expected
 
 
 @pytest.mark.parametrize("turned", [0.0, 0.37, 5.1])
@@ -251,12 +252,12 @@ def test_meshes_stand_where_the_crank_puts_them(tooth, phase):
     start = Start(tooth_pinion=tooth, tooth_wheel=3, phase=phase)
     turned = record.crank_angle(start)
     rolls = start_rolls(drive, turned)
-    line = record.line(Run(system=record, faults=(), start=start)).line
+    line = record.line(Run(system=record, faults=(), start=start)).dynamics
 
     off = [start_phases(drive, turned)[record.mesh_number] - phase]
-    for mesh, pair, roll in zip(line.meshes, drive.pairs, rolls, strict=True):
+    for teeth, pair, roll in zip(line.teeth, drive.pairs, rolls, strict=True):
         expected = (roll + first_slice_lead(pair)) / pair.base_pitch
-        off.append(mesh.start_phase - expected)
+        off.append(teeth.start_phase - expected)
 
     assert_close(off, np.round(off), atol=1e-9)
 

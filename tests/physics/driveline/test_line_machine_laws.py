@@ -52,9 +52,11 @@ def deviations(line, nodes, settling, duration=0.15):
         channels=channels,
         settling=settling,
     )
-    at = line.linear.orders * (line.turned + motion.nominal_angle[:, None])
+    at = line.dynamics.vibration.orders * (
+        line.dynamics.turned + motion.nominal_angle[:, None]
+    )
     linear = [
-        np.real(np.exp(1j * at) @ line.linear.speed_deviation[dof])
+        np.real(np.exp(1j * at) @ line.dynamics.vibration.speed_deviation[dof])
         for _, dof in channels
     ]
     return (
@@ -77,13 +79,15 @@ def test_without_play_it_is_the_linear_line():
         turned=2.0,
     )
     for share, most in ((1.0, 0.15), (0.01, 0.003)):
-        torques = tuple(replace(one, table=share * one.table) for one in whole.torques)
-        linear = replace(
-            whole.linear,
-            angle=share * whole.linear.angle,
-            twist=share * whole.linear.twist,
+        dynamics = whole.dynamics
+        torques = (replace(t, table=share * t.table) for t in dynamics.torques)
+        vibration = replace(
+            dynamics.vibration,
+            angle=share * dynamics.vibration.angle,
+            twist=share * dynamics.vibration.twist,
         )
-        line = replace(whole, torques=torques, linear=linear)
+        weak = replace(dynamics, torques=tuple(torques), vibration=vibration)
+        line = replace(whole, dynamics=weak)
         _, computed, exact = deviations(
             line,
             (14, 17, 13),

@@ -14,7 +14,6 @@ from line_tools import (
     STIFFNESS,
     constant_torques,
     order_of,
-    pair_friction,
     pair_line,
     state_after,
     steps,
@@ -25,7 +24,6 @@ from scipy.integrate import solve_ivp
 from benchmarks._engine_line import engine_line, engine_torques
 from gensig.driveline.time.course import constant_speed
 from gensig.driveline.time.newmark import integrate_line, static_start
-from gensig.driveline.time.toothed_mesh import toothed_mesh
 from gensig.dynamics.pair import PINION_ROTATION
 from gensig.faults.broken import MissingTooth
 
@@ -46,18 +44,11 @@ class TestRippledMesh:
             gap=3e-6 * np.sin(2 * np.pi * u)[None],
             damping=2e-4,
             backlash=1e-4,
+            torques=constant_torques([200.0, -400.0]),
+            nominal=constant_speed(400.0),
         )
-        torques = constant_torques([200.0, -400.0])
-        course = constant_speed(400.0)
-        start = static_start(line, course, torques), np.zeros(2)
-        return lambda n_steps: state_after(
-            line,
-            start,
-            0.02,
-            n_steps,
-            torques=torques,
-            course=course,
-        )
+        start = static_start(line), np.zeros(2)
+        return lambda n_steps: state_after(line, start, 0.02, n_steps)
 
     def test_order_two(self, run):
         exact = run(128000)
@@ -177,29 +168,14 @@ class TestAgainstThePair:
     @pytest.fixture(scope="class")
     @classmethod
     def line(cls, dynamics):
-        mesh = toothed_mesh(
-            "pair",
-            dynamics.teeth,
-            direction=dynamics.approach_direction(),
-            roll_dof=2,
-            damping=dynamics.mesh_damping / dynamics.mesh_force,
-            friction=pair_friction(dynamics),
-        )
-        return pair_line(dynamics, mesh)
+        return pair_line(dynamics)
 
     def test_the_same_motion(self, dynamics, line):
         start = (dynamics.static_start(0.0), np.zeros(6))
         n_steps = self.STEPS * self.N_SAMPLES
         step = 1 / (51200 * self.STEPS)
         q, v, _ = advance(dynamics, *start, step, 0, n_steps)
-        q_1, v_1, motion = state_after(
-            line,
-            start,
-            n_steps * step,
-            n_steps,
-            torques=constant_torques(dynamics.system().force),
-            course=constant_speed(dynamics.operating.speed),
-        )
+        q_1, v_1, motion = state_after(line, start, n_steps * step, n_steps)
         direction = dynamics.approach_direction()
         scale = np.abs(v).max()
 
@@ -211,12 +187,7 @@ class TestAgainstThePair:
         """Statics leave out friction, and what makes up for it."""
         torques = dynamics.system().force
         torques[PINION_ROTATION] -= dynamics.friction_torque()
-        computed = static_start(
-            line,
-            constant_speed(dynamics.operating.speed),
-            constant_torques(torques),
-            time=0.0,
-        )
+        computed = static_start(replace(line, torques=constant_torques(torques)))
         expected = dynamics.static_start(0.0)
         assert_close(
             computed,
@@ -238,11 +209,13 @@ class TestLowRank:
     @pytest.fixture(scope="class")
     @classmethod
     def welded(cls, engine):
-        stiffness = engine.stiffness + sum(
-            mesh.stiffness[0, 0] * np.outer(mesh.direction, mesh.direction)
-            for mesh in engine.meshes
-        )
-        return replace(engine, stiffness=stiffness, meshes=())
+        stiffness = engine.system.stiffness.copy()
+        for mesh in engine.system.meshes:
+            along = mesh.push(len(stiffness))
+            held = 1.0 / mesh.teeth.table.pairs.compliance[0, 0, 0, 0]
+            stiffness += held * np.outer(along, along)
+        system = replace(engine.system, stiffness=stiffness, meshes=())
+        return replace(engine, system=system, reference_force=np.empty(0))
 
     def test_the_same_motion(self, engine, welded):
         """A gear train without backlash is linear."""
@@ -278,9 +251,7 @@ class TestEngine:
     def motion(cls):
         def run(duration=0.15, oversampling=10):
             return integrate_line(
-                engine_line(),
-                constant_speed(1688 * np.pi / 30),
-                engine_torques(),
+                engine_line(torques=engine_torques(), speed=1688 * np.pi / 30),
                 steps(10240.0, oversampling),
                 duration=duration,
                 channels=[

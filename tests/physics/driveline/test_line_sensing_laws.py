@@ -42,12 +42,13 @@ def unfiltered(system):
 
 def rolls(line, time=0.0):
     """Pitches that every mesh has rolled at a time, (mesh,)."""
-    angle = float(line.course.nominal(np.array([time]))[0][0])
+    system = line.dynamics.system
+    angle = float(line.dynamics.course(np.array([time]))[0][0])
     return np.array(
         [
-            mesh.start_phase
-            + mesh.n_teeth[0] * line.line.rotation[mesh.roll_dof] * angle / TURN
-            for mesh in line.line.meshes
+            mesh.teeth.start_phase
+            + mesh.teeth.pair.pinion.n_teeth * system.rotation[mesh.turn] * angle / TURN
+            for mesh in system.meshes
         ]
     )
 
@@ -100,8 +101,9 @@ def test_a_lead_in_turns_every_mesh_back(words):
     on = rolls(before, lead) - rolls(line)
     assert off_by(on).max() < 1e-6
     followed = system.mesh_number
-    here, there = line.line.meshes[followed], before.line.meshes[followed]
-    teeth = zip(here.start_teeth, there.start_teeth, here.n_teeth, strict=True)
+    here, there = (each.dynamics.teeth[followed] for each in (line, before))
+    counts = [gear.n_teeth for gear in here.pair.gears.values()]
+    teeth = zip(here.start_teeth, there.start_teeth, counts, strict=True)
     assert [(first + round(on[followed]) - now) % n for now, first, n in teeth] == [
         0,
         0,
@@ -227,14 +229,16 @@ def test_nuisances_answer_as_the_line_in_time_does(gear, axis):
     course = LineCourse(time=time, speed=np.full(len(time), speed))
     dof = gear_dof(held, system.mesh_number, f"{gear}_{GEAR_AXES[axis]}")
     size = (20.0, 20.0, 0.5)[axis]
-    steady = [replace(t, factor=np.ones(len(time))) for t in held.torques]
+    dynamics = held.dynamics
+    steady = [replace(t, factor=np.ones(len(time))) for t in dynamics.torques]
     push = ShaftTorque(dof=dof, table=np.array([size]), factor=wave)
     solver = LineSolver(sampling_rate=RATE, oversampling=16, max_energy_residual=1.0)
     names = [f"{gear}_x", "pinion_y", "wheel_rotation", "idler_gear_2_y"]
     channels = [("acceleration", gear_dof(held, system.mesh_number, n)) for n in names]
 
     def moved(*more):
-        line = replace(held, course=course, torques=(*steady, *more))
+        moving = replace(dynamics, nominal=course, torques=(*steady, *more))
+        line = replace(held, dynamics=moving)
         motion = line.run(solver, duration=0.2, channels=channels, settling=0.5)
         return np.array([motion.signals[channel] for channel in channels])
 

@@ -153,9 +153,7 @@ def test_a_record_whose_steps_are_too_long_is_made_with_half_of_them():
 
     with pytest.raises(StepError, match="the energy balance misses"):
         integrate_line(
-            line.line,
-            line.course,
-            line.torques,
+            line.dynamics,
             coarse,
             **record,
         )
@@ -204,7 +202,8 @@ def test_a_run_up_follows_its_course_and_its_load_the_law(law, exponent):
     motion = line.run(SOLVER, duration=0.4, channels=channels, settling=0.3)
     speed = motion.nominal_speed
     # the first mesh also speeds up what is behind it
-    inertia = np.diag(line.matrices.mass) * line.line.rotation**2
+    system = line.dynamics.system
+    inertia = system.mass * system.rotation**2
     behind = inertia.sum() - sum(inertia[: line.dof(3) + 1])
     taken = TORQUE * (speed / SPEED) ** exponent
     taken += behind * np.gradient(speed, 1.0 / 10240.0)

@@ -159,12 +159,12 @@ def test_a_torque_ripple_moves_the_gears_as_the_linear_line():
     )
     turning, window = rippled - plain, np.hanning(len(plain))
     line = machines[1].line(run_of(machines[1]))
-    (order,) = np.flatnonzero(np.abs(line.linear.orders - 12.0) < 1e-9)
-    rate = 12.0 * float(line.course.speed[0])
+    (order,) = np.flatnonzero(np.abs(line.dynamics.vibration.orders - 12.0) < 1e-9)
+    rate = 12.0 * float(line.dynamics.nominal.speed[0])
     at_order = np.exp(-1j * rate * np.arange(len(turning)) / RATE) * window
     found = 2.0 * abs(at_order @ turning) / window.sum()
     dof = line.dof(machines[1].driving_node)
-    expected = rate**2 * abs(line.linear.angle[dof, order])
+    expected = rate**2 * abs(line.dynamics.vibration.angle[dof, order])
     assert abs(found / expected - 1.0) < 0.05
 
 
@@ -298,7 +298,7 @@ def test_the_loads_are_the_same_whichever_mesh_is_followed(two_stage):
         read_request([*TWO_STAGE, "system.record_mesh=[5,6]"]).config
     )
     run = run_of(two_stage, with_mesh_state=True)
-    stage = two_stage.line(run).line.meshes[1]
+    stage = two_stage.line(run).dynamics.teeth[1]
     start = Start(
         tooth_pinion=stage.start_teeth[0],
         tooth_wheel=stage.start_teeth[1],
@@ -351,7 +351,7 @@ def test_too_long_steps_are_refused_with_the_motion_that_decides_it(two_stage):
     found = re.search(
         r"the stiffest motion, (.*) at \d+ Hz; .* to at least (\d+)$", str(error)
     )
-    assert found[1] in line_records.dynamics_of(run_of(slow)).dofs
+    assert found[1] in line_records.running_line_of(run_of(slow)).dynamics.dofs
     assert int(found[2]) > two_stage.solver.oversampling
 
 

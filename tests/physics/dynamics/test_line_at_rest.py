@@ -7,8 +7,8 @@ import pytest
 from lane_tools import law_of, on_any_bodies
 from numpy.testing import assert_allclose
 
-from gensig.driveline.side_by_side.line_records import dynamics_of
-from gensig.driveline.side_by_side.line_statics import line_at_rest
+from gensig.driveline.side_by_side.line_records import running_line_of
+from gensig.driveline.time.line_statics import line_at_rest
 from gensig.driveline.time.newmark import static_start
 from gensig.operation.options import read_operating
 from gensig.plan.make import make_plan
@@ -32,19 +32,18 @@ def line(request):
     """One of the lines, its gears with the errors of their grade."""
     config = read_request([*LINES[request.param], *FEW]).config
     record = make_plan(config).record(3)
-    return dynamics_of(InputReader(config).inputs(record).run)
+    return running_line_of(InputReader(config).inputs(record).run).dynamics
 
 
-def at_rest(dynamics, line, force):
+def at_rest(dynamics, system, force):
     """The deflection of the line, or one like it, under forces at time 0."""
-    mean, scale = dynamics.running.reference_force, dynamics.mesh_stiffness
-    return line_at_rest(line, dynamics.teeth, mean, scale, 0.0, force)
+    mean, scale = dynamics.reference_force, dynamics.mesh_stiffness
+    return line_at_rest(system, mean, scale, 0.0, force)
 
 
 @pytest.mark.parametrize("time", [-0.3, 0.2])
 def test_it_is_where_the_implicit_method_has_it(line, time):
-    running = line.running
-    expected = static_start(running.line, running.course, running.torques, time=time)
+    expected = static_start(line, time=time)
     found = line.static_start(time)
     assert_allclose(found, expected, rtol=0.0, atol=1e-7 * np.abs(expected).max())
     assert np.abs(line.static_start(time + 1e-3) - expected).max() > 1e-7
@@ -52,25 +51,26 @@ def test_it_is_where_the_implicit_method_has_it(line, time):
 
 def test_the_teeth_carry_what_the_springs_do_not(line):
     """By the mesh law of the compiled core."""
-    force, running = still_forces(line), line.running.line
-    still = at_rest(line, running, force)
-    carried = force - running.stiffness @ still
-    mean = line.running.reference_force
+    force, system = still_forces(line), line.system
+    still = at_rest(line, system, force)
+    carried = force - system.governed_stiffness @ still
+    loads = loads_of(system, carried)
     operating = read_operating(read_request([]).config.section("operating"))
-    for mesh, teeth, load, usual in zip(
-        running.meshes, line.teeth, loads_of(running, carried), mean, strict=True
+    for mesh, load, usual in zip(
+        system.meshes, loads, line.reference_force, strict=True
     ):
+        teeth = mesh.teeth
         radius = teeth.pair.pinion.base_radius
-        roll = teeth.start_roll + radius * still[mesh.roll_dof]
+        roll = teeth.start_roll + radius * still[mesh.turn]
         law = law_of(on_any_bodies(teeth, usual, operating))
-        found = law(roll, mesh.direction @ still, 0.0, 0.0)[0]
+        found = law(roll, mesh.approach(still), 0.0, 0.0)[0]
         assert_allclose(found, load, rtol=1e-4)
         assert load > 0.5 * usual
 
 
-def loads_of(line, carried):
+def loads_of(system, carried):
     """Mesh forces that make up forces on the degrees of freedom."""
-    reach = np.stack([mesh.direction for mesh in line.meshes])
+    reach = np.stack([mesh.push(len(carried)) for mesh in system.meshes])
     loads = np.linalg.lstsq(reach.T, carried, rcond=None)[0]
     assert_allclose(reach.T @ loads, carried, atol=1e-6 * np.abs(loads).max())
     return loads
@@ -78,23 +78,15 @@ def loads_of(line, carried):
 
 def still_forces(line):
     """The torques at time 0, where those that change are the set ones, without friction."""
-    return line.forces(np.zeros(1))[0] - line.running.line.friction_torque
+    return line.forces(np.zeros(1))[0] - line.friction_torque
 
 
 def test_a_free_line_is_at_rest_in_the_motion_that_nothing_balances(line):
-    running = line.running.line
-    free = replace(running, stiffness=without_governor(running), held=None)
+    free = replace(line.system, held=np.zeros_like(line.system.held))
     force = still_forces(line)
     force[0] += 5.0  # N m more than the load takes
     deflection = at_rest(line, free, force)
-    rigid = free.mass @ free.rotation
+    rigid = free.mass * free.rotation
     share = (force @ free.rotation) / (rigid @ free.rotation)
     pushed = force - share * rigid - free.stiffness @ deflection
     assert (loads_of(free, pushed) > 0.0).all()
-
-
-def without_governor(line):
-    """Stiffness of a line less that of its governor."""
-    if line.held is None:
-        return line.stiffness
-    return line.stiffness - np.outer(line.held, line.held)

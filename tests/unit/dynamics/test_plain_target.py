@@ -29,7 +29,7 @@ CASES = {
     "two_stage": (
         ["experiment=two_stage", RIPPLE],
         read_line_machine,
-        line_records.dynamics_of,
+        lambda run: line_records.running_line_of(run).dynamics,
     ),
 }
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.driveline.time.geared_line import GearedLine
+from gensig.dynamics.equations import Equations
 from gensig.dynamics.mesh_teeth import MeshTeeth
 
 Array = NDArray[np.float64]
@@ -19,8 +17,7 @@ FREE = 1e-12  # share of the springs that hold a line which turns freely
 
 
 def line_at_rest(
-    line: GearedLine,
-    teeth: Sequence[MeshTeeth],
+    system: Equations,
     mean: Array,
     scale: Array,
     angle: float,
@@ -37,16 +34,15 @@ def line_at_rest(
     open stands at the touch of its drive flanks. What the springs and meshes of a free line do not
     balance accelerates it as a rigid body, and it is at rest in that motion.
     """
-    stiffness, force = _held(line, force)
-    reach = np.stack([mesh.direction for mesh in line.meshes])
+    stiffness, force = _held(system, force)
+    reach = np.stack([mesh.push(len(force)) for mesh in system.meshes])
     carried, q = mean.copy(), np.zeros(len(force))
     for _ in range(ROUNDS):
-        turned = line.rotation * angle + q
+        turned = system.rotation * angle + q
+        meshes = zip(system.meshes, carried, scale, strict=True)
         states = [
-            _static(of_mesh, float(turned[mesh.roll_dof]), load, stiffness)
-            for of_mesh, mesh, load, stiffness in zip(
-                teeth, line.meshes, carried, scale, strict=True
-            )
+            _static(mesh.teeth, float(turned[mesh.turn]), load, at_work)
+            for mesh, load, at_work in meshes
         ]
         approach, tangent = np.array(states).T
         # mesh forces as deflections of the mean stiffness, so that all rows are of one size
@@ -63,19 +59,31 @@ def line_at_rest(
     return np.asarray(q)
 
 
-def _held(line: GearedLine, force: Array) -> tuple[Array, Array]:
-    """Stiffness and forces of a line that does not turn as a whole."""
-    rotation = line.rotation
+def is_free(system: Equations) -> bool:
+    """True for a line whose rotation as a whole no spring holds."""
+    rotation, stiffness = system.rotation, system.governed_stiffness
     size = np.abs(rotation)
-    free = rotation @ line.stiffness @ rotation
-    if free > FREE * float(size @ np.abs(line.stiffness) @ size):
-        return line.stiffness, force
-    momentum = line.mass @ rotation
-    inertia = float(rotation @ momentum)
-    held = line.stiffness + np.outer(momentum, momentum) * (
-        np.abs(line.stiffness).max() / np.abs(momentum).max() ** 2
+    held = float(rotation @ stiffness @ rotation)
+    return held <= FREE * float(size @ np.abs(stiffness) @ size)
+
+
+def balanced(system: Equations, force: Array) -> Array:
+    """Forces (dof,) less those that accelerate the line as a rigid body."""
+    momentum = system.mass * system.rotation
+    inertia = float(momentum @ system.rotation)
+    return force - momentum * (float(force @ system.rotation) / inertia)
+
+
+def _held(system: Equations, force: Array) -> tuple[Array, Array]:
+    """Stiffness and forces of a line that does not turn as a whole."""
+    stiffness = system.governed_stiffness
+    if not is_free(system):
+        return stiffness, force
+    momentum = system.mass * system.rotation
+    held = stiffness + np.outer(momentum, momentum) * (
+        np.abs(stiffness).max() / np.abs(momentum).max() ** 2
     )
-    return held, force - momentum * (float(force @ rotation) / inertia)
+    return held, balanced(system, force)
 
 
 def _static(
