@@ -28,7 +28,6 @@ from gensig.driveline.time.newmark import (
     LineMotion,
     LineSolver,
     integrate_line,
-    static_start,
 )
 from gensig.dynamics.equations import (
     A_TURN,
@@ -163,7 +162,7 @@ class RunningLine:
         lead = max(settling, LEAD_SAMPLES / solver.sampling_rate)
         lead = math.ceil(lead * solver.sampling_rate) / solver.sampling_rate
         angle, rate = self.dynamics.vibration_at(-lead)
-        start = static_start(self.dynamics, time=-lead) + angle, rate
+        start = self.dynamics.static_start(-lead) + angle, rate
         while True:
             try:
                 return integrate_line(

@@ -86,6 +86,16 @@ class MeshTeeth:
         return static_mesh(self.table, states, force)
 
     @property
+    def healthy(self) -> MeshTeeth:
+        """Teeth without faults and errors in their place, as the back flanks are taken."""
+        return MeshTeeth.perfect(self.table.healthy)
+
+    def mirrored(self, roll: Array) -> Array:
+        """Rolls of the back flanks where the drive flanks have rolled so far, m."""
+        middle = self.pair.pitch_point + self.table.half_lag
+        return np.asarray(2.0 * middle + 0.5 * self.pair.base_pitch - roll)
+
+    @property
     def nearest_gaps(self) -> Array:
         """No less than these are the gaps of any pair of teeth, with their errors, (node,) m."""
         table = self.table

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,11 @@ class GearTeeth:
 
     kind: Index
     present: NDArray[np.bool_]
+
+    @property
+    def healthy(self) -> GearTeeth:
+        """The gear with healthy teeth alone."""
+        return replace(self, kind=np.zeros_like(self.kind))
 
     @property
     def commonest(self) -> int:
@@ -107,6 +112,12 @@ class ToothTable:
     def present(self) -> NDArray[np.bool_]:
         """True for pairs of teeth neither of which is missing, (pinion kind, wheel kind)."""
         return self.pinion.present[:, None] & self.wheel.present[None, :]
+
+    @property
+    def healthy(self) -> ToothTable:
+        """The table of a mesh of healthy teeth alone."""
+        pinion, wheel = self.pinion.healthy, self.wheel.healthy
+        return replace(self, pinion=pinion, wheel=wheel)
 
     @property
     def first_touch(self) -> Array:

@@ -297,8 +297,7 @@ def solve_contact(
     free : (mesh,) m                approaches if the meshes went on with the forces ``carried``
         (mesh, N_LAW)
     before, rate_before : (mesh,)   approaches and their rates where the step began
-    per_step : 1/s                  2 / h: the rate is per_step (delta - before) - rate_before;
-        0 for statics
+    per_step : 1/s                  2 / h: the rate is per_step (delta - before) - rate_before
     approach : (mesh,) m            first guess, takes the solution
     law : (mesh, N_LAW)             what the meshes do there, at the guess and then at the solution
     work : ``Work``

@@ -1,4 +1,4 @@
-"""Compiled core: Newmark's average acceleration for a geared shaft line, and its state at rest.
+"""Compiled core: Newmark's average acceleration for a geared shaft line.
 
 The symbols are those of ``docs/theory/shaft_line_integration.md``. Scalar code without
 reassociation, own loops instead of library calls: bits depend on nothing but the numbers given.
@@ -20,11 +20,6 @@ from gensig.driveline.time._scheme import NEWMARK
 from gensig.dynamics._vector import compiled
 
 ANGLE, SPEED, ACCELERATION, MESH_FORCE = range(4)  # kinds of channels
-MOST_PUSHES = 20000  # a soft drive of 0.05 Hz takes half of them
-AT_REST, NEARLY = (
-    1e-10,
-    1e-5,
-)  # of the largest deviation; below the latter, what no longer shrinks is rounding
 
 
 @compiled
@@ -395,79 +390,6 @@ def advance(
     return -1
 
 
-@compiled
-def rest(line, meshes, force, angle, q, law, work):
-    """Deviations q at rest under ``force`` (dof,) at a nominal angle, in place.
-
-    ``line`` holds the factor of sigma M + K. Each round solves (sigma M + K) q = f + sigma M
-    q_before - D^T F(q), a step towards the least of a convex energy that leaves sigma / (sigma +
-    omega^2) of what is left in every mode; what moves is solved for the change of the forces, so
-    that nothing large cancels in the end.
-
-    Returns
-    -------
-    rounds, or -1 where it does not come to rest
-    """
-    n, n_meshes = len(q), len(law)
-    moved, still, turned, idle, resting = (
-        work.moved,
-        work.ahead_v,
-        work.turned,
-        work.roll_rate,
-        work.rate,
-    )
-    before, free, approach, law_1 = work.before, work.free, work.approach, work.law
-    still[:] = 0.0
-    resting[:] = 0.0
-    before_most = math.inf
-    for round_ in range(MOST_PUSHES):
-        roll(meshes, angle, 0.0, q, still, turned, idle)
-        work.reach[:] = -math.inf
-        for i in range(n):
-            moved[i] = force[i]
-        add_product(line.stiffness, -1.0, q, moved)
-        for m in range(n_meshes):
-            before[m] = row_product(line.direction, m, q)
-            approach[m] = before[m]
-            mesh_law(meshes, m, turned[m], 0.0, approach[m], 0.0, law_1, work)
-            for p in range(line.direction.first[m], line.direction.first[m + 1]):
-                moved[line.direction.column[p]] -= (
-                    law[m, layout.FORCE] * line.direction.value[p]
-                )
-        solve(line.factor, moved)
-        for m in range(n_meshes):
-            free[m] = before[m] + row_product(line.direction, m, moved)
-        rounds = solve_contact(
-            meshes,
-            line.compliance,
-            free,
-            law,
-            turned,
-            resting,
-            before,
-            resting,
-            0.0,
-            approach,
-            law_1,
-            work,
-        )
-        if rounds < 0:
-            return -1
-        largest, most = 0.0, 0.0
-        for m in range(n_meshes):
-            grown = law_1[m, layout.FORCE] - law[m, layout.FORCE]
-            for i in range(n):
-                moved[i] -= grown * line.answer[m, i]
-            law[m, layout.FORCE] = law_1[m, layout.FORCE]
-        for i in range(n):
-            q[i] += moved[i]
-            largest, most = max(largest, abs(q[i])), max(most, abs(moved[i]))
-        if most <= AT_REST * largest or before_most <= most <= NEARLY * largest:
-            return round_ + 1
-        before_most = most
-    return -1
-
-
 __all__ = [
     "advance",
     "energy",
@@ -476,5 +398,4 @@ __all__ = [
     "look",
     "nominal",
     "respond",
-    "rest",
 ]

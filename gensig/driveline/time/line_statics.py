@@ -17,26 +17,28 @@ FREE = 1e-12  # share of the springs that hold a line which turns freely
 
 
 def line_at_rest(
-    system: Equations,
-    mean: Array,
-    scale: Array,
-    angle: float,
-    force: Array,
+    system: Equations, mean: Array, scale: Array, angle: float, force: Array
 ) -> Array:
     """Deflection under forces (dof,) at a nominal angle of the reference in rad, (dof,).
 
-    ``mean`` (mesh,) N and ``scale`` (mesh,) N/m are forces and stiffnesses of the meshes at work.
-    With the approach d of every mesh under its force F by ``MeshTeeth.static``,
+    ``mean`` (mesh,) N and ``scale`` (mesh,) N/m are sizes of the forces and stiffnesses of the
+    meshes at work. With the approach d of every mesh under its force F by ``MeshTeeth.static``,
 
         K q + D^T F = force,   D q = d(F)
 
-    is solved by Newton's method from the mean force of every mesh on. A mesh that the forces would
-    open stands at the touch of its drive flanks. What the springs and meshes of a free line do not
-    balance accelerates it as a rigid body, and it is at rest in that motion.
+    is solved by Newton's method. A mesh stands on the flanks that its mean force presses together.
+    One that the forces would open stands at their touch. What the springs and meshes of a free line
+    do not balance accelerates it as a rigid body, and it is at rest in that motion.
     """
     stiffness, force = _held(system, force)
-    reach = np.stack([mesh.push(len(force)) for mesh in system.meshes])
-    carried, q = mean.copy(), np.zeros(len(force))
+    n = len(force)
+    if not system.meshes:
+        return np.asarray(np.linalg.lstsq(stiffness, force, rcond=None)[0])
+    reach = np.stack([mesh.push(n) for mesh in system.meshes])
+    sense = np.where([mesh.mean_force < 0.0 for mesh in system.meshes], -1.0, 1.0)
+    carried, q = sense * mean, np.zeros(n)
+    # mesh forces as deflections of the mean stiffness, so that all rows are of one size
+    pushed = scale[:, None] * reach
     for _ in range(ROUNDS):
         turned = system.rotation * angle + q
         meshes = zip(system.meshes, carried, scale, strict=True)
@@ -45,15 +47,13 @@ def line_at_rest(
             for mesh, load, at_work in meshes
         ]
         approach, tangent = np.array(states).T
-        # mesh forces as deflections of the mean stiffness, so that all rows are of one size
-        pushed = scale[:, None] * reach
         matrix = np.block(
             [[stiffness, pushed.T], [pushed, -np.diag(scale**2 / tangent)]]
         )
         right = np.concatenate([force, scale * (approach - carried / tangent)])
         solution = np.linalg.solve(matrix, right)
-        before, q = q, solution[: len(q)]
-        carried = np.maximum(scale * solution[len(q) :], LEAST * mean)
+        before, q = q, solution[:n]
+        carried = sense * np.maximum(sense * scale * solution[n:], LEAST * mean)
         if np.abs(q - before).max() <= SAME * np.abs(q).max():
             break
     return np.asarray(q)
@@ -80,9 +80,10 @@ def _held(system: Equations, force: Array) -> tuple[Array, Array]:
     if not is_free(system):
         return stiffness, force
     momentum = system.mass * system.rotation
-    held = stiffness + np.outer(momentum, momentum) * (
-        np.abs(stiffness).max() / np.abs(momentum).max() ** 2
-    )
+    # of the size of the springs, or any where meshes are all that is elastic
+    size = float(np.abs(stiffness).max()) or 1.0
+    share = momentum / np.abs(momentum).max()
+    held = stiffness + size * np.outer(share, share)
     return held, balanced(system, force)
 
 
@@ -91,11 +92,16 @@ def _static(
 ) -> tuple[float, float]:
     """Approach in m and tangent stiffness in N/m of a mesh whose driving gear has turned.
 
-    Where no tooth is there the stiffness is that ``at_work``.
+    Its back flanks touch under a negative load. Where no tooth is there the stiffness is that
+    ``at_work``.
     """
-    roll = teeth.start_roll + teeth.pair.pinion.base_radius * turned
-    static = teeth.static(teeth.states(np.array([roll])), load)
+    rolls = np.array([teeth.start_roll + teeth.pair.pinion.base_radius * turned])
+    sense, offset = 1.0, 0.0
+    if load < 0.0:
+        sense, offset = -1.0, -teeth.pair.backlash
+        rolls, teeth = teeth.mirrored(rolls), teeth.healthy
+    static = teeth.static(teeth.states(rolls), abs(load))
     approach, stiffness = float(static.approach[0]), float(static.stiffness[0])
     if not (np.isfinite(approach) and stiffness > 0.0):
-        return 0.0, at_work
-    return approach, stiffness
+        return offset, at_work
+    return offset + sense * approach, stiffness

@@ -24,7 +24,6 @@ from gensig.driveline.time.line_arrays import (
     pack_torques,
 )
 from gensig.driveline.time.line_dynamics import LineDynamics
-from gensig.driveline.time.line_statics import balanced, is_free
 from gensig.dynamics.backends.base import N_SEEN
 from gensig.dynamics.decimation import decimator
 from gensig.dynamics.equations import Equations
@@ -36,8 +35,6 @@ KINDS = ("angle", "speed", "acceleration", "mesh_force")
 BLOCK = 512  # output samples that are integrated between two passes of the low-pass
 OUT_OF_BOUNDS = 1e6  # m, rad, m/s or rad/s
 LONGEST_STEP = 0.25  # pitches that a mesh may roll in a step
-# 1/s2, below elastic modes but not so far that rounding moves a free line
-STILL = (2.0 * math.pi) ** 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,7 +118,7 @@ def integrate_line(
     ----------
     channels : ("angle" | "speed" | "acceleration", degree of freedom) or ("mesh_force", mesh)
     start : deviations and their rates, (dof,) each, where the integration begins; None is
-        ``static_start``
+        ``LineDynamics.static_start``
     with_pairs : whether the state of the pairs of teeth is told at every sample
 
     The low-pass looks ahead and back: integration begins at least ``decimation.Decimator.margin``
@@ -151,7 +148,7 @@ def integrate_line(
     first_sample = -max(low_pass.margin + 1, math.ceil(lead_in * solver.sampling_rate))
     if start is None:
         begin = first_sample / solver.sampling_rate
-        start = static_start(line, time=begin), np.zeros(n)
+        start = line.static_start(begin), np.zeros(n)
     run = _Run(line, solver, start, channels)
     if with_pairs:
         run.seen = np.zeros((n_samples, len(line.system.meshes), N_SEEN))
@@ -177,36 +174,6 @@ def _rounded_above(value: float, limit: float) -> str:
     """A value in three digits, or in as many as show that it is above a limit."""
     texts = (f"{value:.{digits}g}" for digits in range(3, 18))
     return next((text for text in texts if float(text) > limit), f"{value:.3g}")
-
-
-def static_start(line: LineDynamics, *, time: float = 0.0) -> Array:
-    """Deviations at which the line turns without vibrating under its mean torques at a time,
-    (dof,).
-
-    Torques over an angle act with the mean of their tables. What they do not balance accelerates
-    a free line as one rigid body, and the line is at rest in that motion. Friction, and what makes
-    up for it, are left out.
-
-    Raises
-    ------
-    SimulationError    where it does not come to rest
-    """
-    system = line.system
-    order = elimination_order(system)
-    still = pack_line(line, order, STILL, 0.0, "at rest")
-    meshes = pack_meshes(system, order)
-    angle = float(line.nominal.nominal(np.array([time]))[0][0])
-    force = line.mean_forces(time)
-    if is_free(system):
-        force = balanced(system, force)
-    q, law = np.zeros(len(order)), np.zeros((len(system.meshes), layout.N_LAW))
-    given = still, meshes, force[order], angle, q, law, _scratch(system)
-    if kernels.rest(*given) < 0:
-        raise SimulationError(
-            "line: it does not come to rest under its mean torques; give a start, or "
-            "check torques and springs"
-        )
-    return q[np.argsort(order)]
 
 
 class _Run:

@@ -5,16 +5,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from line_tools import chain, constant_torques, state_after, two_gears, with_system
+from line_tools import (
+    bodies,
+    chain,
+    constant_torques,
+    law_at,
+    line_of,
+    state_after,
+    turning_mesh,
+    two_gears,
+    with_system,
+)
 
 from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
-from gensig.driveline.time.newmark import (
-    LineSolver,
-    _rounded_above,
-    integrate_line,
-    static_start,
-)
+from gensig.driveline.time.newmark import LineSolver, _rounded_above, integrate_line
 from gensig.dynamics.equations import NONE
+from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.errors import ConfigError, GensigError, SimulationError
 
 SOLVER = LineSolver(sampling_rate=10240.0, oversampling=4, max_energy_residual=1e-3)
@@ -230,7 +236,7 @@ class TestRun:
     def test_rest_of_a_free_line_is_in_its_own_acceleration(self):
         """Unbalanced torques accelerate the whole line; the mesh drives the second inertia."""
         line = two_gears(torques=constant_torques([10.0, 0.0]))
-        q = static_start(line)
+        q = line.static_start(0.0)
         reduced = 0.01 + 0.05 * 0.5**2
         force = 10.0 / reduced * 0.5 * 0.05 / 0.1
         approach = line.system.meshes[0].approach(q)
@@ -240,19 +246,40 @@ class TestRun:
         """The drive's spring carries what is not balanced."""
         spring = (0.01 + 0.05 * 0.5**2) * (2 * math.pi * 0.1) ** 2
         torques = constant_torques([1e-3, 0.0])
-        q = static_start(two_gears(drive=(spring, 0.0), torques=torques))
+        q = two_gears(drive=(spring, 0.0), torques=torques).static_start(0.0)
         assert q[0] == pytest.approx(1e-3 / spring, rel=1e-6)
 
     def test_rest_of_an_unloaded_line_is_where_it_is(self):
-        assert np.abs(static_start(two_gears(backlash=1e-4))).max() < 1e-15
+        assert np.abs(two_gears(backlash=1e-4).static_start(0.0)).max() < 1e-13
 
     def test_what_drives_backwards_rests_on_the_back_flanks(self):
         torques = constant_torques([-10.0, 20.0])
         line = two_gears(backlash=1e-4, torques=torques)
-        q = static_start(line)
+        mesh = replace(line.system.meshes[0], mean_force=-200.0)
+        q = with_system(line, meshes=(mesh,)).static_start(0.0)
         assert line.system.meshes[0].approach(q) == pytest.approx(
             -1e-4 - 10.0 / 0.05 / 3e8, rel=1e-6
         )
+
+
+@pytest.mark.parametrize("torque", [-60.0, 60.0])
+def test_teeth_rest_where_their_law_carries_the_torque(xiamen, torque):
+    """On the drive flanks with the errors of the teeth, on the back flanks without."""
+    counts = xiamen.pair.pinion.n_teeth, xiamen.pair.wheel.n_teeth
+    rng = np.random.default_rng(4)
+    errors = tuple(rng.normal(0.0, 2e-6, n) for n in counts)
+    teeth = replace(MeshTeeth.perfect(xiamen.mesh_table()), errors=errors)
+    radius = xiamen.pair.pinion.base_radius
+    mesh = replace(turning_mesh(teeth), mean_force=torque / radius)
+    nothing, rotation = np.zeros((2, 2)), np.array([1.0, counts[0] / counts[1]])
+    line = line_of(
+        bodies(np.ones(2), nothing, nothing, rotation, [mesh]),
+        torques=constant_torques(torque * np.array([1.0, -counts[1] / counts[0]])),
+        reference_force=np.array([abs(torque) / radius]),
+    )
+    q = line.static_start(0.0)
+    force = law_at(mesh, q[0] * radius / xiamen.pair.base_pitch, mesh.approach(q))[0]
+    assert force == pytest.approx(torque / radius, rel=1e-4)
 
 
 @pytest.mark.parametrize(
