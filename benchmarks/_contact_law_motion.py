@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from benchmarks._mesh_numbers import MeshNumbers
-from gensig.dynamics.system import LumpedSystem
+from gensig.dynamics.pair import PairDynamics
 from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS
 from gensig.mesh.tooth_table import ToothTable
 
@@ -289,8 +289,7 @@ def _integrate(
 def motion(
     mesh: Mesh,
     numbers: MeshNumbers,
-    system: LumpedSystem,
-    direction: Array,
+    dynamics: PairDynamics,
     start: Array,
     *,
     step: float,
@@ -301,21 +300,21 @@ def motion(
 
     Begins with the deflections ``start``, (dof,), at rest against the nominal rotation.
 
-    ``direction`` (dof,) is the gradient of the approach. Raises where a back flank would be
-    reached, which has no law
-    here.
+    Raises where a back flank would be reached, which has no law here.
     """
     velocity = np.empty(n_steps + 1)
     state = np.concatenate([start, np.zeros_like(start)])
-    spring, damper = np.diag(system.stiffness).copy(), np.diag(system.damping).copy()
+    system = dynamics.equations
+    spring = np.diag(system.governed_stiffness).copy()
+    damper = np.diag(system.governed_damping).copy()
     lowest = _integrate(
         mesh,
         numbers,
-        direction,
+        dynamics.approach_direction(),
         system.mass,
         spring,
         damper,
-        system.force,
+        dynamics.set_force,
         state,
         step,
         first_step,

@@ -259,7 +259,7 @@ def scipy_works(dynamics: PairDynamics) -> dict[str, Work]:
 def _numpy_right_hand_side(dynamics: PairDynamics) -> RightHandSide:
     group, system, direction = (
         pack([dynamics], 1e-6),
-        dynamics.system(),
+        dynamics.equations,
         dynamics.approach_direction(),
     )
     n_dof, scratch = (
@@ -278,9 +278,9 @@ def _numpy_right_hand_side(dynamics: PairDynamics) -> RightHandSide:
         _classical_scheme.law_at(group, motion.ravel(), *scratch, result.ravel())
         normal, friction, moment_p, moment_w, along = result[:5, 0]
         force = (
-            system.force
-            - system.stiffness @ q
-            - system.damping @ v
+            dynamics.set_force
+            - system.governed_stiffness @ q
+            - system.governed_damping @ v
             - normal * direction
         )
         force[:6] += friction, 0.0, moment_p + radius * along, -friction, 0.0, moment_w

@@ -50,7 +50,7 @@ class Machine(NamedTuple):
 
 def machine(dynamics: PairDynamics) -> Machine:
     """The numbers of one machine of six degrees of freedom."""
-    table, system = dynamics.table, dynamics.system()
+    table, system = dynamics.table, dynamics.equations
     if len(system.mass) != N_DOF:
         raise ValueError(
             f"{len(system.mass)} degrees of freedom; {N_DOF} are written out here"
@@ -65,9 +65,9 @@ def machine(dynamics: PairDynamics) -> Machine:
         wheel_tilt=dynamics.teeth.tilts[1],
         table=np.stack(table.pairs, axis=-1)[:, :, 0],
         inverse_mass=1.0 / system.mass,
-        stiffness=np.diag(system.stiffness).copy(),
-        damper=np.diag(system.damping).copy(),
-        force=system.force,
+        stiffness=np.diag(system.governed_stiffness).copy(),
+        damper=np.diag(system.governed_damping).copy(),
+        force=dynamics.set_force,
     )
 
 

@@ -201,8 +201,7 @@ def record(
     velocity = motion(
         mesh_of(this, law, n_loads),
         mesh_numbers(dynamics),
-        dynamics.system(),
-        dynamics.approach_direction(),
+        dynamics,
         dynamics.static_start(first / rate),
         step=step,
         first_step=first * oversampling,

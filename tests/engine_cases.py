@@ -12,7 +12,8 @@ import yaml
 
 from gensig.driveline.excitation.engine import read_engine
 from gensig.driveline.excitation.engine_torques import engine_torques
-from gensig.driveline.linear.forced import Elements, LinearLine, steady_response
+from gensig.driveline.linear.forced import Elements, steady_response
+from gensig.dynamics.linear_system import LinearSystem
 
 CONFIGS = Path(__file__).resolve().parents[1] / "configs"
 TABLE = CONFIGS / "tables" / "engine_shafting.csv"
@@ -89,7 +90,7 @@ def engine_line(damper="as_printed"):
     elements = Elements(
         directions=directions, stiffness=stiffness, loss=loss * stiffness
     )
-    line = LinearLine(
+    line = LinearSystem(
         mass=np.diag(inertia),
         stiffness=elements.stiffness_matrix(),
         loss=elements.loss_matrix(),

@@ -134,7 +134,7 @@ def pair_line(dynamics: PairDynamics, **more) -> LineDynamics:
         dynamics.dofs,
         **{
             "nominal": constant_speed(dynamics.operating.speed),
-            "torques": constant_torques(dynamics.system().force),
+            "torques": constant_torques(dynamics.set_force),
             **more,
         },
     )

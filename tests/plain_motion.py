@@ -28,12 +28,12 @@ def equations(
     ``prescribed`` lets the mesh roll with the set speed, not with the pinion. A number of seconds
     damps the force by that times its rate, c proportional to k, in place of the law's own damping.
     """
-    system, direction = dynamics.system(), dynamics.approach_direction()
+    system, direction = dynamics.equations, dynamics.approach_direction()
     law, mass = law_of(dynamics), system.mass[:, None]
     radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
     free = np.eye(12, k=6)
-    free[6:] = -np.hstack([system.stiffness, system.damping]) / mass
-    pushed = np.concatenate([np.zeros(6), system.force / system.mass])
+    free[6:] = -np.hstack([system.governed_stiffness, system.governed_damping]) / mass
+    pushed = np.concatenate([np.zeros(6), dynamics.set_force / system.mass])
     # motion of the mesh by state
     motion = np.zeros((4, 12))
     motion[1, :6] = motion[2, 6:] = direction

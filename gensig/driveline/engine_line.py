@@ -21,7 +21,6 @@ from gensig.driveline.excitation.motor import KIND, read_motor
 from gensig.driveline.excitation.motor_torques import MotorDrive, motor_torques
 from gensig.driveline.linear.forced import (
     Elements,
-    LinearLine,
     SteadyResponse,
     closed_line,
     over_cycle,
@@ -30,6 +29,7 @@ from gensig.driveline.linear.forced import (
 from gensig.driveline.linear.matrices import LineMatrices
 from gensig.driveline.linear.stiffness_range import check_stiffness_range
 from gensig.driveline.table_rows import told_nodes
+from gensig.dynamics.linear_system import LinearSystem
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
 from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed
@@ -76,7 +76,7 @@ class EngineLine:
             for mesh in self.drive.line.meshes
         )
 
-    def linear(self) -> tuple[LinearLine, Elements]:
+    def linear(self) -> tuple[LinearSystem, Elements]:
         """The line whose meshes never part, and its meshes."""
         return closed_line(self.matrices())
 

@@ -146,13 +146,26 @@ class Equations:
         """Damping with that of the governor, (dof, dof)."""
         return self.damping + self.held_damping * np.outer(self.held, self.held)
 
-    def rates(self, mesh_stiffness: Array) -> NDArray[np.complex128]:
-        """Eigenvalues in 1/s with every mesh held at a stiffness in N/m, (mesh,)."""
-        n, damping = len(self.mass), self.governed_damping
-        stiffness = self.governed_stiffness
-        for mesh, held in zip(self.meshes, mesh_stiffness.tolist(), strict=True):
-            along = mesh.push(n)
-            stiffness = stiffness + held * np.outer(along, along)
+    def closed(
+        self, mesh_stiffness: Array, mesh_damping: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Stiffness and damping with a spring and a damper in every mesh, (dof, dof) each.
+
+        ``mesh_stiffness`` (mesh,) N/m, ``mesh_damping`` (mesh,) N s/m, None for none.
+        """
+        n, dampers = len(self.mass), np.zeros(len(self.meshes))
+        if mesh_damping is not None:
+            dampers = mesh_damping
+        reach = np.array([mesh.push(n) for mesh in self.meshes]).reshape(-1, n)
+        stiffness = self.governed_stiffness + (reach.T * mesh_stiffness) @ reach
+        return stiffness, self.governed_damping + (reach.T * dampers) @ reach
+
+    def rates(
+        self, mesh_stiffness: Array, mesh_damping: Array | None = None
+    ) -> NDArray[np.complex128]:
+        """Eigenvalues in 1/s with every mesh held as in ``closed``."""
+        n = len(self.mass)
+        stiffness, damping = self.closed(mesh_stiffness, mesh_damping)
         for element in self.elements:
             stiffness = stiffness + element.largest_stiffness(n)
         state, per_mass = np.zeros((2 * n, 2 * n)), 1.0 / self.mass[:, None]

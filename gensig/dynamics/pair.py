@@ -12,10 +12,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.dynamics.bodies import HOUSING, Bodies, Motion, Spring
 from gensig.dynamics.equations import PAIR_SLIDE, Dynamics, Equations, Mesh
 from gensig.dynamics.helical import AXIAL_DOFS, axial_reach, pitches
 from gensig.dynamics.mesh_teeth import MeshTeeth
-from gensig.dynamics.system import LumpedSystem
 from gensig.errors import ConfigError
 from gensig.mesh.tooth_table import ToothTable
 from gensig.operation.setpoint import Operating
@@ -241,57 +241,55 @@ class PairDynamics(Dynamics):
         """Circular frequency of the soft speed source on all rotating bodies, rad/s."""
         return 2.0 * math.pi * self.operating.drive_frequency
 
-    def system(self) -> LumpedSystem:
+    @cached_property
+    def bodies(self) -> Bodies:
         """Equations (1) of the spur paper with corrected signs, motor and load, without the mesh.
 
         Action and reaction on both gears, mesh force driving the wheel:
-        ``docs/theory/spur_dynamics.md``. The soft speed source acts on the deviation from the set
-        rotation, so it is a spring and a damper on the motor if there is one, else on the pinion.
-        Its set angle leads by the wind-up of the mean torque, so that the mean deviation of the
-        pinion is about 0.
+        ``docs/theory/spur_dynamics.md``. The soft speed source is not among the springs.
         """
-        return self._system
-
-    @cached_property
-    def _system(self) -> LumpedSystem:
-        dofs, p, w, ratio = self.dofs, self.pinion, self.wheel, self.table.pair.ratio
-        mass, rotation, force = np.zeros((3, len(dofs)))
-        stiffness, damping = np.zeros((2, len(dofs), len(dofs)))
-        mass[: len(PAIR_DOFS)] = p.mass, p.mass, p.inertia, w.mass, w.mass, w.inertia
-        rotation[PINION_ROTATION], rotation[WHEEL_ROTATION] = 1.0, 1.0 / ratio
-        spring, damper = np.einsum("ii->i", stiffness), np.einsum("ii->i", damping)
-        for x, z, body in ((PINION_X, PINION_Z, p), (WHEEL_X, WHEEL_Z, w)):
-            held = body.support
-            spring[x : x + 2] = held.stiffness_x, held.stiffness_y
-            damper[x : x + 2] = held.damping_x, held.damping_y
-            if self.is_helical:
-                mass[z : z + 3] = body.mass, body.tilt_inertia, body.tilt_inertia
-                spring[z], spring[z + 1 : z + 3] = held.stiffness_z, held.stiffness_tilt
-                damper[z], damper[z + 1 : z + 3] = held.damping_z, held.damping_tilt
-        driver, driven = self._ends
-        for rotor, dof, gear in (
-            (self.motor, driver, PINION_ROTATION),
-            (self.load, driven, WHEEL_ROTATION),
+        gears = ("pinion", self.pinion, 1.0), ("wheel", self.wheel, self._wheel_speed)
+        plane = [motion for gear in gears for motion in _in_plane(*gear)]
+        springs = [
+            *_supports(PINION_X, self.pinion.support),
+            *_supports(WHEEL_X, self.wheel.support),
+        ]
+        if self.is_helical:
+            plane += [m for name, body, _ in gears for m in _along_axis(name, body)]
+            springs += _axial_supports(PINION_Z, self.pinion.support)
+            springs += _axial_supports(WHEEL_Z, self.wheel.support)
+        for rotor, dof, gear in zip(
+            (self.motor, self.load),
+            self._ends,
+            (PINION_ROTATION, WHEEL_ROTATION),
+            strict=True,
         ):
             if rotor is not None:
-                mass[dof], rotation[dof] = rotor.inertia, rotation[gear]
-                _couple(stiffness, dof, gear, rotor.coupling_stiffness)
-                _couple(damping, dof, gear, rotor.coupling_damping(mass[gear]))
-        spring[driver] += self.drive_stiffness
-        damper[driver] += self.drive_damping
+                turning = plane[gear]
+                plane.append(Motion(self.dofs[dof], rotor.inertia, turning.speed))
+                damping = rotor.coupling_damping(turning.inertia)
+                springs.append(Spring(dof, gear, rotor.coupling_stiffness, damping))
+        return Bodies(motions=tuple(plane), springs=tuple(springs))
+
+    @property
+    def _wheel_speed(self) -> float:
+        return 1.0 / self.table.pair.ratio
+
+    @cached_property
+    def set_force(self) -> Array:
+        """Forces at the set torque, (dof,); all of them follow a torque profile.
+
+        The soft speed source acts on the deviation from the set rotation, so it is a spring and a
+        damper on the motor if there is one, else on the pinion. Its set angle leads by the wind-up
+        of the mean torque, so that the mean deviation of the pinion is about 0.
+        """
+        force, (driver, driven) = np.zeros(len(self.dofs)), self._ends
         force[driver] = self.operating.torque + self.friction_torque()
         if self.motor is not None:
             lead = self.drive_stiffness * force[driver] / self.motor.coupling_stiffness
             force[driver] += lead
-        force[driven] = -self.operating.torque * ratio
-        return LumpedSystem(
-            names=dofs,
-            mass=mass,
-            stiffness=stiffness,
-            damping=damping,
-            force=force,
-            rotation=rotation,
-        )
+        force[driven] = -self.operating.torque * self.table.pair.ratio
+        return force
 
     def approach_direction(self) -> Array:
         """Gradient of the approach along the line of action, (dof,)."""
@@ -322,16 +320,10 @@ class PairDynamics(Dynamics):
     @cached_property
     def equations(self) -> Equations:
         """As ``Dynamics.equations``: one mesh, held by the soft speed source alone."""
-        system, options, (driver, _) = self.system(), self.table.options, self._ends
+        bodies, options, (driver, _) = self.bodies, self.table.options, self._ends
         n_touched, force = len(self.gear_dofs), self.mesh_force
-        held, stiffness, damping = (
-            np.zeros(len(self.dofs)),
-            system.stiffness.copy(),
-            system.damping.copy(),
-        )
+        held = np.zeros(len(self.dofs))
         held[driver] = math.sqrt(self.drive_stiffness)
-        stiffness[driver, driver] -= self.drive_stiffness
-        damping[driver, driver] -= self.drive_damping
         slide = np.zeros(n_touched)
         slide[: len(PAIR_SLIDE)] = PAIR_SLIDE
         mesh = Mesh(
@@ -345,10 +337,10 @@ class PairDynamics(Dynamics):
             speed=self.operating.speed,
         )
         return Equations(
-            mass=system.mass,
-            stiffness=stiffness,
-            damping=damping,
-            rotation=system.rotation,
+            mass=bodies.mass,
+            stiffness=bodies.stiffness,
+            damping=bodies.damping,
+            rotation=bodies.rotation,
             held=held,
             held_damping=self.drive_damping / self.drive_stiffness,
             meshes=(mesh,),
@@ -373,9 +365,7 @@ class PairDynamics(Dynamics):
 
     def forces(self, times: Array) -> Array:
         """As ``Dynamics.forces``: all of them follow the torque."""
-        return np.outer(
-            self.operating.nominal(times).torque_factor, self.system().force
-        )
+        return np.outer(self.operating.nominal(times).torque_factor, self.set_force)
 
     def factors(self, times: Array) -> Array:
         """As ``Dynamics.factors``: no torque follows an angle."""
@@ -392,7 +382,7 @@ class PairDynamics(Dynamics):
         The pinion has not turned.
         """
         start = self.static_start(0.0)
-        return np.asarray(start - self.system().rotation * start[PINION_ROTATION])
+        return np.asarray(start - self.equations.rotation * start[PINION_ROTATION])
 
     def start(self, time: float) -> tuple[Array, Array]:
         """As ``Dynamics.start``: at rest."""
@@ -405,7 +395,8 @@ class PairDynamics(Dynamics):
         Under a nominal acceleration it is that of the accelerated machine. A ripple is left out:
         it is too fast for an equilibrium.
         """
-        pair, system, (driver, driven) = self.table.pair, self.system(), self._ends
+        pair, (driver, driven) = self.table.pair, self._ends
+        set_force, stiffness = self.set_force, self.equations.governed_stiffness
         times, radius = np.array([time]), pair.pinion.base_radius
         smooth = self.operating.without_ripple.nominal(times)
         factor = float(self.operating.nominal(times).torque_factor[0])
@@ -413,10 +404,10 @@ class PairDynamics(Dynamics):
         wheel_acceleration = acceleration / pair.ratio
         inertia_torque = wheel_acceleration * self.driven_inertia
         force = factor * self.mesh_force + inertia_torque / pair.wheel.base_radius
-        start = np.zeros(len(system.mass))
+        start = np.zeros(len(set_force))
         start[PINION_ROTATION] -= acceleration / self._drive_rate**2
         if self.motor is not None:
-            lead = factor * system.force[driver] / system.stiffness[driver, driver]
+            lead = factor * set_force[driver] / stiffness[driver, driver]
             start[driver] = start[PINION_ROTATION] + lead
             torque = acceleration * (self.reduced_inertia - self.motor.inertia)
             start[PINION_ROTATION] -= torque / self.motor.coupling_stiffness
@@ -430,21 +421,50 @@ class PairDynamics(Dynamics):
         reach = self.approach_direction()
         axial = range(len(PAIR_DOFS), len(self.gear_dofs))
         for dof in (PINION_Y, WHEEL_Y, *axial):
-            if system.stiffness[dof, dof] > 0.0:
-                start[dof] = -reach[dof] * force / system.stiffness[dof, dof]
+            if stiffness[dof, dof] > 0.0:
+                start[dof] = -reach[dof] * force / stiffness[dof, dof]
         pushed = start[WHEEL_Y] - start[PINION_Y]
         for dof in axial:
             pushed += reach[dof] * start[dof]
         start[WHEEL_ROTATION] = (pushed - approach + advance) / pair.wheel.base_radius
         if self.load is not None:
             inertia_torque = wheel_acceleration * self.load.inertia
-            torque = factor * system.force[driven] - inertia_torque
+            torque = factor * set_force[driven] - inertia_torque
             twist = torque / self.load.coupling_stiffness
             start[driven] = start[WHEEL_ROTATION] + twist
         return start
 
 
-def _couple(matrix: Array, first: int, second: int, value: float) -> None:
-    """Put a spring or a damper between two degrees of freedom."""
-    matrix[[first, second], [first, second]] += value
-    matrix[[first, second], [second, first]] -= value
+def _in_plane(name: str, body: Body, speed: float) -> tuple[Motion, ...]:
+    """Motions of a gear in its plane, in the order of ``PAIR_DOFS``."""
+    return (
+        Motion(f"{name}_x", body.mass),
+        Motion(f"{name}_y", body.mass),
+        Motion(f"{name}_rotation", body.inertia, speed),
+    )
+
+
+def _along_axis(name: str, body: Body) -> tuple[Motion, ...]:
+    """Motions of a helical gear along its axis, in the order of ``AXIAL_DOFS``."""
+    return (
+        Motion(f"{name}_z", body.mass),
+        Motion(f"{name}_tilt_x", body.tilt_inertia),
+        Motion(f"{name}_tilt_y", body.tilt_inertia),
+    )
+
+
+def _supports(x: int, held: Support) -> tuple[Spring, ...]:
+    """Springs to the housing of a gear whose motion along x has the number ``x``."""
+    return (
+        Spring(x, HOUSING, held.stiffness_x, held.damping_x),
+        Spring(x + 1, HOUSING, held.stiffness_y, held.damping_y),
+    )
+
+
+def _axial_supports(z: int, held: Support) -> tuple[Spring, ...]:
+    """Springs to the housing of a gear whose motion along z has the number ``z``."""
+    return (
+        Spring(z, HOUSING, held.stiffness_z, held.damping_z),
+        Spring(z + 1, HOUSING, held.stiffness_tilt, held.damping_tilt),
+        Spring(z + 2, HOUSING, held.stiffness_tilt, held.damping_tilt),
+    )

@@ -13,6 +13,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.dynamics.linear_system import LinearSystem
 from gensig.dynamics.pair import Body, PairDynamics
 from gensig.units import check_choice
 
@@ -93,14 +94,20 @@ def accelerations(dynamics: PairDynamics, frequency: Array, force: Complex) -> C
     Source: -w^2 (K + i w C - w^2 M)^-1 F of the linear system, K and C with the mesh's k h h^T
     and c h h^T. Assumes forces so small that teeth stay in contact at the same positions.
     """
-    system, direction = dynamics.system(), dynamics.approach_direction()
-    mesh = np.outer(direction, direction)
-    w = np.asarray(frequency, dtype=np.float64)[:, None, None]
-    stiffness = system.stiffness + dynamics.mean_mesh_stiffness * mesh
-    damping = system.damping + dynamics.mesh_damping * mesh
-    dynamic = stiffness - w**2 * np.diag(system.mass) + 1j * w * damping
-    displacement = np.linalg.solve(dynamic, force[:, :, None])[:, :, 0]
-    return np.asarray(-(w[:, :, 0] ** 2) * displacement)
+    stiffness, damping = dynamics.equations.closed(*_mesh_of(dynamics))
+    line = LinearSystem(
+        mass=np.diag(dynamics.equations.mass),
+        stiffness=stiffness,
+        loss=np.zeros_like(stiffness),
+        damping=damping,
+    )
+    displacement = line.response(force, frequency)
+    return np.asarray(-(frequency[:, None] ** 2) * displacement)
+
+
+def _mesh_of(dynamics: PairDynamics) -> tuple[Array, Array]:
+    """Mean stiffness and damping of the mesh, (mesh,) N/m and N s/m."""
+    return dynamics.mesh_stiffness, np.array([dynamics.mesh_damping])
 
 
 def natural_frequencies(dynamics: PairDynamics) -> tuple[Array, Array]:
@@ -113,15 +120,7 @@ def natural_frequencies(dynamics: PairDynamics) -> tuple[Array, Array]:
 
     Source: eigenvalues lambda of M q'' + C q' + K q = 0, K and C as in ``accelerations``.
     """
-    from scipy.linalg import eigvals
-
-    system, direction = dynamics.system(), dynamics.approach_direction()
-    mesh = np.outer(direction, direction)
-    mass = np.asarray(system.mass)[:, None]
-    stiffness = (system.stiffness + dynamics.mean_mesh_stiffness * mesh) / mass
-    damping = (system.damping + dynamics.mesh_damping * mesh) / mass
-    unit, zero = np.eye(len(direction)), np.zeros_like(mesh)
-    roots = eigvals(np.block([[zero, unit], [-stiffness, -damping]]))
+    roots = dynamics.equations.rates(*_mesh_of(dynamics))
     swing = roots[roots.imag > LEAST_SWING * np.abs(roots).max()]
     swing = swing[np.argsort(np.abs(swing), kind="stable")]
     rate = np.abs(swing)

@@ -156,7 +156,7 @@ def periodic_motion(dynamics, period, n_points):
     damping = 2 * ratio * math.sqrt(stiffness * dynamics.equivalent_mass)
     mesh = np.concatenate([stiffness * direction, damping * direction])
     held = free.copy()
-    held[6:] -= np.outer(direction / dynamics.system().mass, mesh)
+    held[6:] -= np.outer(direction / dynamics.equations.mass, mesh)
     returns = expm(held * period) - np.eye(12)
 
     start = at_rest(dynamics)

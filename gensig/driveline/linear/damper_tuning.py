@@ -20,11 +20,11 @@ from gensig.driveline.linear.dampers import TorsionalDamper
 from gensig.driveline.linear.forced import (
     TURNS_PER_CYCLE,
     Elements,
-    LinearLine,
     cycle_orders,
     over_cycle,
     steady_response,
 )
+from gensig.dynamics.linear_system import LinearSystem
 from gensig.errors import ConfigError
 
 Array = NDArray[np.float64]
@@ -89,7 +89,7 @@ class NodeResponse:
 
 
 def response_at_nodes(
-    line: LinearLine,
+    line: LinearSystem,
     elements: Elements,
     element: int,
     torques: Callable[[float], Array],

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.driveline.linear.matrices import LineMatrices
+from gensig.dynamics.linear_system import LinearSystem
 from gensig.errors import SimulationError
 
 Array = NDArray[np.float64]
@@ -26,60 +27,6 @@ TURNS_PER_CYCLE = 2
 USUAL_ORDERS = 200  # half orders: up to order 100
 UNBALANCED = 1e-6  # of the largest mean torque, that a free line may be left with
 RIGID = 1e-9  # of the largest stiffness eigenvalue: nothing holds such a motion
-ASYMMETRIC = 1e-9
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LinearLine:
-    """M q'' + C q' + (K + i H) q = f: four matrices (dof, dof), in kg m2, N m s/rad and N m/rad
-    for rotations.
-
-    ``loss`` H is the sum of loss factor times stiffness of the elements; it is meant for harmonic
-    motion only.
-    """
-
-    mass: Array
-    stiffness: Array
-    loss: Array
-    damping: Array
-
-    def __post_init__(self) -> None:
-        n_dof = len(self.mass)
-        for name in ("mass", "stiffness", "loss", "damping"):
-            matrix = getattr(self, name)
-            if matrix.shape != (n_dof, n_dof) or not np.all(np.isfinite(matrix)):
-                raise ValueError(
-                    f"{name} {matrix.shape} must be a finite matrix ({n_dof}, {n_dof})"
-                )
-            if np.max(np.abs(matrix - matrix.T)) > ASYMMETRIC * np.max(np.abs(matrix)):
-                raise ValueError(f"{name} must be symmetric")
-
-    def dynamic_stiffness(self, frequency: Array) -> ComplexArray:
-        """K + i H + i w C - w^2 M, (frequency, dof, dof), at angular frequencies (frequency,)
-        rad/s.
-        """
-        w = np.asarray(frequency, dtype=float)[:, None, None]
-        return (
-            self.stiffness
-            + 1j * (self.loss + w * self.damping)
-            - np.square(w) * self.mass
-        )
-
-    def response(self, force: ComplexArray, frequency: Array) -> ComplexArray:
-        """Complex amplitudes, (frequency, dof), of forces (frequency, dof) at frequencies in
-        rad/s, none of them 0.
-
-        Raises
-        ------
-        SimulationError    where an undamped line is excited at its own frequency
-        """
-        dynamic = self.dynamic_stiffness(frequency)
-        try:
-            return np.asarray(np.linalg.solve(dynamic, force[..., None])[..., 0])
-        except np.linalg.LinAlgError:
-            raise SimulationError(
-                "an undamped line is excited at its natural frequency; give it damping"
-            ) from None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -104,7 +51,7 @@ class Elements:
         return (self.directions.T * self.loss) @ self.directions
 
 
-def closed_line(matrices: LineMatrices) -> tuple[LinearLine, Elements]:
+def closed_line(matrices: LineMatrices) -> tuple[LinearSystem, Elements]:
     """A line whose meshes never lose contact, each a spring of its stiffness, and those meshes."""
     meshes = Elements(
         directions=matrices.directions,
@@ -112,7 +59,7 @@ def closed_line(matrices: LineMatrices) -> tuple[LinearLine, Elements]:
         loss=matrices.mesh_loss_factor * matrices.mesh_stiffness,
     )
     dampers = (matrices.directions.T * matrices.mesh_damping) @ matrices.directions
-    line = LinearLine(
+    line = LinearSystem(
         mass=matrices.mass,
         stiffness=matrices.stiffness + meshes.stiffness_matrix(),
         loss=matrices.loss_stiffness + meshes.loss_matrix(),
@@ -201,7 +148,7 @@ def cycle_orders(torque: Array, n_orders: int) -> tuple[Array, ComplexArray]:
 
 
 def steady_response(
-    line: LinearLine, torque: Array, speed: float, *, n_orders: int = USUAL_ORDERS
+    line: LinearSystem, torque: Array, speed: float, *, n_orders: int = USUAL_ORDERS
 ) -> SteadyResponse:
     """Steady vibration of a line under torques over the cycle.
 
@@ -227,7 +174,7 @@ def steady_response(
 
 
 def disturbance_response(
-    line: LinearLine, dof: int, torque: float, frequency: float
+    line: LinearSystem, dof: int, torque: float, frequency: float
 ) -> ComplexArray:
     """Complex amplitudes, (dof,) rad, of a torque (N m) of a frequency (rad/s) of its own on one
     degree of freedom.
@@ -267,7 +214,7 @@ class Waterfall:
 
 
 def run_of_speeds(
-    line: LinearLine,
+    line: LinearSystem,
     torques: Callable[[float], Array],
     speeds: Iterable[float],
     dofs: Sequence[int],
@@ -306,13 +253,13 @@ def run_of_speeds(
 
 
 @lru_cache(maxsize=4)
-def _statics(line: LinearLine) -> tuple[Array, Array]:
+def _statics(line: LinearSystem) -> tuple[Array, Array]:
     """Eigenvalues and vectors of the stiffness, kept for the next speed."""
     values, vectors = np.linalg.eigh(line.stiffness)
     return values, vectors
 
 
-def _mean_twist(line: LinearLine, mean: Array) -> Array:
+def _mean_twist(line: LinearSystem, mean: Array) -> Array:
     """Static deflection under mean torques that balance over the motions which nothing holds."""
     values, vectors = _statics(line)
     held = values > RIGID * values[-1]

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.driveline.line_gears import gear_dof, gear_names, line_bodies, meshes_of
-from gensig.driveline.linear.forced import LinearLine
 from gensig.driveline.running import RunningLine, single_thread
+from gensig.dynamics.linear_system import LinearSystem
 from gensig.dynamics.response import GEAR_AXES, GearShaft, LinearMachine
 from gensig.units import SPEED, check_choice
 
@@ -40,17 +40,17 @@ class LinearDriveLine(LinearMachine):
     mesh_forces: Array
 
     @cached_property
-    def closed(self) -> LinearLine:
+    def closed(self) -> LinearSystem:
         """The line with a spring and a damper in every mesh, losses viscous."""
         matrices, system = self.running.matrices, self.running.dynamics.system
-        across = matrices.directions.T
-        return LinearLine(
+        stiffness, damping = system.closed(
+            matrices.mesh_stiffness, matrices.mesh_damping
+        )
+        return LinearSystem(
             mass=np.diag(system.mass),
-            stiffness=system.governed_stiffness
-            + (across * matrices.mesh_stiffness) @ matrices.directions,
+            stiffness=stiffness,
             loss=matrices.loss_stiffness,
-            damping=system.governed_damping
-            + (across * matrices.mesh_damping) @ matrices.directions,
+            damping=damping,
         )
 
     def shaft(self, gear: str) -> GearShaft:

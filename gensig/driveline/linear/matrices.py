@@ -6,13 +6,15 @@ Torsion alone, or with the lateral motion of the gears.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.driveline.linear.shaft_line import GearMesh, LineGear, Shaft, ShaftLine
+from gensig.driveline.linear.shaft_line import GearMesh, LineGear, ShaftLine
+from gensig.dynamics.bodies import HOUSING, Bodies, Motion, Spring
 from gensig.dynamics.pair import Support
 from gensig.errors import ConfigError
 
@@ -90,45 +92,59 @@ def line_matrices(
     for dof, nodes in enumerate(compounds):
         expand[list(nodes), dof] = 1.0
     expand[n_nodes:, n_rotations:] = np.eye(2 * len(moving))
-    mass = np.array([node.inertia for node in line.nodes])
-    stiffness, damping, loss = np.zeros((3, n_coordinates, n_coordinates))
-    for shaft in line.shafts:
-        if shaft.stiffness is not None:
-            _join(stiffness, shaft, shaft.stiffness)
-            _join(loss, shaft, shaft.loss_factor * shaft.stiffness)
-            _join(damping, shaft, shaft.damping)
-    for gear in moving:
-        held, here = _support(gear), [len(mass), len(mass) + 1]
-        mass = np.append(mass, [gear.mass, gear.mass])
-        stiffness[here, here] = held.stiffness_x, held.stiffness_y
-        damping[here, here] = held.damping_x, held.damping_y
+    bodies = _bodies(line, moving)
     rotation = np.zeros((len(line.elastic_parts), n_coordinates))
     for row, nodes in zip(rotation, line.elastic_parts, strict=True):
         row[list(nodes)] = np.abs(line.speed_ratio[list(nodes)])
-    gear_names = [f"{gear.name} {axis}" for gear in moving for axis in "xy"]
+    gear_names = bodies.names[n_nodes:]
     compound_names = [
         " + ".join(line.nodes[n].name for n in nodes) for nodes in compounds
     ]
     return LineMatrices(
         names=(*compound_names, *gear_names),
-        mass=expand.T @ np.diag(mass) @ expand,
-        damping=expand.T @ damping @ expand,
-        stiffness=expand.T @ stiffness @ expand,
-        loss_stiffness=expand.T @ loss @ expand,
+        mass=expand.T @ np.diag(bodies.mass) @ expand,
+        damping=expand.T @ bodies.damping @ expand,
+        stiffness=expand.T @ bodies.stiffness @ expand,
+        loss_stiffness=expand.T @ bodies.loss @ expand,
         directions=_directions(line, n_coordinates, lateral=lateral) @ expand,
         mesh_stiffness=np.array([mesh.stiffness for mesh in line.meshes]),
         mesh_damping=np.array([mesh.damping for mesh in line.meshes]),
         mesh_loss_factor=np.array([mesh.loss_factor for mesh in line.meshes]),
         backlash=np.array([mesh.backlash for mesh in line.meshes]),
         rigid=rotation @ expand / expand.sum(axis=0),
-        coordinate_names=(*(node.name for node in line.nodes), *gear_names),
-        coordinate_mass=mass,
+        coordinate_names=bodies.names,
+        coordinate_mass=bodies.mass,
         expand=expand,
         coordinate_node=np.array(
             [*range(n_nodes), *(gear.node for gear in moving for _ in "xy")],
             dtype=np.int64,
         ),
     )
+
+
+def _bodies(line: ShaftLine, moving: Sequence[LineGear]) -> Bodies:
+    """Rotations of all nodes, then x and y of the moving gears, with shafts and supports."""
+    motions = [Motion(node.name, node.inertia) for node in line.nodes]
+    springs = [
+        Spring(
+            shaft.first,
+            shaft.second,
+            shaft.stiffness,
+            shaft.damping,
+            shaft.loss_factor * shaft.stiffness,
+        )
+        for shaft in line.shafts
+        if shaft.stiffness is not None
+    ]
+    for gear in moving:
+        held, x = _support(gear), len(motions)
+        mass = gear.mass or 0.0
+        motions += [Motion(f"{gear.name} {axis}", mass) for axis in "xy"]
+        springs += [
+            Spring(x, HOUSING, held.stiffness_x, held.damping_x),
+            Spring(x + 1, HOUSING, held.stiffness_y, held.damping_y),
+        ]
+    return Bodies(motions=tuple(motions), springs=tuple(springs))
 
 
 def _support(gear: LineGear) -> Support:
@@ -155,13 +171,6 @@ def _directions(line: ShaftLine, n_coordinates: int, *, lateral: bool) -> Array:
                 x = len(line.nodes) + 2 * number
                 row[x : x + 2] += sign * math.sin(turn), -sign * math.cos(turn)
     return directions
-
-
-def _join(matrix: Array, shaft: Shaft, value: float) -> None:
-    first, second = shaft.first, shaft.second
-    matrix[[first, second], [first, second]] += value
-    matrix[first, second] -= value
-    matrix[second, first] -= value
 
 
 def _line_of_action(line: ShaftLine, mesh: GearMesh) -> float:

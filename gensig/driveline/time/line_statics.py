@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 ROUNDS = 20
 SAME = 1e-12  # share of the deflection by which it changes in the last round
 LEAST = 1e-6  # share of the mean force of its teeth that a mesh carries at least
+STILL = (2.0 * np.pi * 1e-4) ** 2  # 1/s2, far below any drive that holds a mean speed
 FREE = 1e-12  # share of the springs that hold a line which turns freely
 
 
@@ -33,7 +34,7 @@ def line_at_rest(
     stiffness, force = _held(system, force)
     n = len(force)
     if not system.meshes:
-        return np.asarray(np.linalg.lstsq(stiffness, force, rcond=None)[0])
+        return np.asarray(np.linalg.solve(stiffness, force))
     reach = np.stack([mesh.push(n) for mesh in system.meshes])
     sense = np.where([mesh.mean_force < 0.0 for mesh in system.meshes], -1.0, 1.0)
     carried, q = sense * mean, np.zeros(n)
@@ -75,8 +76,11 @@ def balanced(system: Equations, force: Array) -> Array:
 
 
 def _held(system: Equations, force: Array) -> tuple[Array, Array]:
-    """Stiffness and forces of a line that does not turn as a whole."""
-    stiffness = system.governed_stiffness
+    """Stiffness and forces of a line that does not turn as a whole.
+
+    What dampers alone hold, as the ring of a damper, stands still on next to no spring.
+    """
+    stiffness = system.governed_stiffness + STILL * np.diag(system.mass)
     if not is_free(system):
         return stiffness, force
     momentum = system.mass * system.rotation

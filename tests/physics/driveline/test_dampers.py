@@ -10,13 +10,13 @@ from gensig.driveline.linear.damper_tuning import response_at_nodes, tune_damper
 from gensig.driveline.linear.dampers import TorsionalDamper, with_dampers
 from gensig.driveline.linear.forced import (
     Elements,
-    LinearLine,
     closed_line,
     steady_response,
 )
 from gensig.driveline.linear.matrices import line_matrices
 from gensig.driveline.linear.modal import natural_modes
 from gensig.driveline.linear.shaft_line import Node, Shaft, ShaftLine
+from gensig.dynamics.linear_system import LinearSystem
 
 # of the spring that holds the one disc, whose inertia is 1: its frequency is 1 rad/s
 STIFFNESS = 1.0
@@ -27,7 +27,7 @@ def one_disc():
     """A disc on a spring to the ground under one harmonic torque of 1 N m at half the speed."""
     one = np.eye(1)
     zero = np.zeros((1, 1))
-    line = LinearLine(
+    line = LinearSystem(
         mass=one,
         stiffness=STIFFNESS * one,
         loss=zero,

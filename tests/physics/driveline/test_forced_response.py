@@ -21,7 +21,6 @@ from engine_cases import (
 from gensig.driveline.excitation.cycle import cycle_angles
 from gensig.driveline.linear.forced import (
     Elements,
-    LinearLine,
     closed_line,
     cycle_orders,
     disturbance_response,
@@ -29,6 +28,7 @@ from gensig.driveline.linear.forced import (
     run_of_speeds,
     steady_response,
 )
+from gensig.dynamics.linear_system import LinearSystem
 from gensig.errors import SimulationError
 
 NODES = tuple(ratios())
@@ -45,7 +45,7 @@ def chain(loss_factor=0.0, damping=0.0, grounded=True):
         stiffness=stiffness,
         loss=loss_factor * stiffness,
     )
-    line = LinearLine(
+    line = LinearSystem(
         mass=np.diag([0.5, 0.3, 0.2]),
         stiffness=springs.stiffness_matrix(),
         loss=springs.loss_matrix(),
@@ -94,7 +94,7 @@ def test_response_here_to_a_torque_there_is_that_there_to_one_here(damper):
 
 
 def test_one_disc_on_a_shaft_is_the_closed_form():
-    one = LinearLine(
+    one = LinearSystem(
         mass=np.array([[2.0]]),
         stiffness=np.array([[800.0]]),
         loss=np.array([[40.0]]),
@@ -302,7 +302,7 @@ def test_matrices_and_orders_that_make_no_line_are_refused():
             refused()
     one = np.eye(1)
     zero = np.zeros((1, 1))
-    undamped = LinearLine(mass=one, stiffness=one, loss=zero, damping=zero)
+    undamped = LinearSystem(mass=one, stiffness=one, loss=zero, damping=zero)
 
     with pytest.raises(
         SimulationError,

@@ -16,7 +16,7 @@ from gensig.driveline.mesh_phase import first_slice_lead, start_phases, start_ro
 from gensig.driveline.running import Governor, running_line, steady_course
 from gensig.driveline.teeth import ToothStart, neighbours, tooth_there
 from gensig.driveline.time.newmark import LineSolver
-from gensig.dynamics.mesh_statics import mean_mesh_stiffness
+from gensig.dynamics.mesh_teeth import mean_mesh_stiffness
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.plan.request import read_request

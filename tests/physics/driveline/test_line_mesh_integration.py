@@ -185,7 +185,7 @@ class TestAgainstThePair:
 
     def test_the_same_rest(self, dynamics, line):
         """Statics leave out friction, and what makes up for it."""
-        torques = dynamics.system().force
+        torques = dynamics.set_force.copy()
         torques[PINION_ROTATION] -= dynamics.friction_torque()
         loaded = replace(line, torques=constant_torques(torques))
         computed = loaded.static_start(0.0)

@@ -301,16 +301,16 @@ def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, r
     """Matrices of the line are those of the pair without its soft drive."""
     system = machine(rotors)
     dynamics = dynamics_of(system)
-    pair_system = dynamics.system()
+    pair_system = dynamics.equations
     matrices = drive_line_of_pair(system, "pair").matrices()
     order = []
     for name in matrices.names:
         gear, _, axis = name.partition(" ")
-        order.append(pair_system.names.index(f"{gear}_{axis or 'rotation'}"))
+        order.append(dynamics.dofs.index(f"{gear}_{axis or 'rotation'}"))
     both = np.ix_(order, order)
-    driver = pair_system.names.index("motor_rotation" if rotors else "pinion_rotation")
+    driver = dynamics.dofs.index("motor_rotation" if rotors else "pinion_rotation")
 
-    stiffness = pair_system.stiffness.copy()
+    stiffness = pair_system.governed_stiffness.copy()
     stiffness[driver, driver] -= dynamics.drive_stiffness
 
     assert_close(np.diag(matrices.mass), pair_system.mass[order], 1e-14)
@@ -321,9 +321,9 @@ def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, r
         atol=1e-9 * stiffness.max(),
     )
 
-    damping = matrices.damping - pair_system.damping[both]
+    damping = matrices.damping - pair_system.governed_damping[both]
     damping[order.index(driver), order.index(driver)] = 0.0
-    assert_close(damping, 0.0, atol=1e-12 * pair_system.damping.max())
+    assert_close(damping, 0.0, atol=1e-12 * pair_system.governed_damping.max())
 
     direction = dynamics.approach_direction()
     assert_close(

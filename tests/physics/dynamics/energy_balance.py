@@ -44,18 +44,18 @@ def balance(dynamics, step, n_steps):
     )
     law = laws(dynamics, motions, step)
     _, friction, moment_p, moment_w, _, stored, lost, _ = law.T
-    system = dynamics.system()
+    system = dynamics.equations
     turning = np.isin(np.arange(len(start)), (2, 5))
-    k = np.diag(system.stiffness)
-    c = np.diag(system.damping)
+    k = np.diag(system.governed_stiffness)
+    c = np.diag(system.governed_damping)
     speeds = v + dynamics.operating.speed * system.rotation
     kinetic = 0.5 * speeds**2 @ system.mass
     elastic = 0.5 * q**2 @ np.where(turning, 0.0, k)
-    drive = system.force[2] - k[2] * q[:, 2] - c[2] * v[:, 2]
+    drive = dynamics.set_force[2] - k[2] * q[:, 2] - c[2] * v[:, 2]
     moments = moment_p * speeds[:, 2] + moment_w * speeds[:, 5]
     return Balance(
         energy=kinetic + elastic + stored,
-        supplied=drive * speeds[:, 2] + system.force[5] * speeds[:, 5],
+        supplied=drive * speeds[:, 2] + dynamics.set_force[5] * speeds[:, 5],
         supports=v**2 @ np.where(turning, 0.0, c),
         mesh_damping=lost,
         friction=friction * (v[:, 0] - v[:, 3]) + moments,

@@ -144,10 +144,14 @@ class TestForces:
         options = replace(gears.table.options, **plain)
         table = replace(gears.table, options=options)
         still = with_teeth(gears, table=table)
-        system = still.system()
+        system = still.equations
         start = gears.static_start(0.0)
         acceleration = right_hand_side(still, 0.0, start, np.zeros(12))
-        force = system.mass * acceleration - system.force + system.stiffness @ start
+        force = (
+            system.mass * acceleration
+            - still.set_force
+            + system.governed_stiffness @ start
+        )
         at_pinion, at_wheel, push = contact(gears)
         normal = force[1]
 

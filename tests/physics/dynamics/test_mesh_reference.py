@@ -69,7 +69,7 @@ class Reference:
         self.d = dynamics
         self.table = dynamics.table
         self.pair = dynamics.table.pair
-        self.system = dynamics.system()
+        self.system = dynamics.equations
         self.shared = self.table.shared_compliance
         self.damping = mesh_numbers(dynamics.equations.meshes[0], dynamics.rest, 1e-6)[
             DAMPING
@@ -201,8 +201,8 @@ class Reference:
         system = self.system
         turning = moment_p + self.pair.pinion.base_radius * along
         force = np.array([friction, 0, turning, -friction, 0, moment_w])
-        force += system.force - normal * self.d.approach_direction()
-        force -= system.stiffness @ q + system.damping @ v
+        force += self.d.set_force - normal * self.d.approach_direction()
+        force -= system.governed_stiffness @ q + system.governed_damping @ v
         return force / system.mass
 
 

@@ -249,6 +249,15 @@ class TestRun:
         q = two_gears(drive=(spring, 0.0), torques=torques).static_start(0.0)
         assert q[0] == pytest.approx(1e-3 / spring, rel=1e-6)
 
+    def test_a_ring_that_a_damper_alone_holds_rests_where_it_is(self):
+        line = chain(3)
+        stiffness = np.diag([1e3, 0.0, 0.0])
+        damping = 0.1 * np.array([[0.0, 0, 0], [0, 1, -1], [0, -1, 1]])
+        stiffness[:2, :2] += 1e4 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        held = with_system(line, stiffness=stiffness, damping=damping)
+        q = replace(held, torques=constant_torques([0.0, 5.0, 0.0])).static_start(0.0)
+        assert q == pytest.approx([5e-3, 5.5e-3, 0.0], rel=1e-6, abs=1e-12)
+
     def test_rest_of_an_unloaded_line_is_where_it_is(self):
         assert np.abs(two_gears(backlash=1e-4).static_start(0.0)).max() < 1e-13
 

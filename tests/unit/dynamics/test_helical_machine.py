@@ -18,7 +18,7 @@ from gensig.dynamics.backends.nystroem.machine_lanes import (
 from gensig.dynamics.equations import N_IN_PLANE
 from gensig.dynamics.helical import AXIAL_DOFS, pitches
 from gensig.dynamics.integrator import check_channels
-from gensig.dynamics.mesh_statics import loss_arm
+from gensig.dynamics.mesh_teeth import loss_arm
 from gensig.dynamics.pair import PAIR_DOFS, Body, Support
 from gensig.errors import ConfigError
 from gensig.mesh.tooth_table import GearTeeth, left_out_energy
@@ -87,7 +87,7 @@ def test_impossible_axial_keys_are_refused(keys, text):
 
 
 def test_masses_and_supports_of_the_axial_motions(helical):
-    system = helical.system()
+    system = helical.equations
     for name in AXIAL_DOFS:
         dof = helical.dofs.index(name)
         gear = getattr(helical, name.partition("_")[0])
@@ -101,15 +101,15 @@ def test_masses_and_supports_of_the_axial_motions(helical):
             )
         diagonals = (
             system.mass,
-            np.diag(system.stiffness),
-            np.diag(system.damping),
+            np.diag(system.governed_stiffness),
+            np.diag(system.governed_damping),
         )
         assert_close(
             [values[dof] for values in diagonals],
             expected,
             1e-12,
         )
-        assert np.count_nonzero(system.stiffness[dof]) == 1
+        assert np.count_nonzero(system.governed_stiffness[dof]) == 1
         assert system.rotation[dof] == 0.0
 
 
@@ -123,7 +123,7 @@ def test_motor_and_load_follow_the_gears(helical, machine):
         "load_rotation",
     )
 
-    approach = whole.approach_direction() @ whole.system().rotation
+    approach = whole.approach_direction() @ whole.equations.rotation
     assert_close(approach, 0.0, atol=1e-15)
     assert isinstance(pack([whole], 1e-6), HelicalPairGroup)
 
@@ -144,7 +144,10 @@ def test_gears_that_do_not_move_along_their_axes_are_another_group(helical):
 def test_supports_hold_the_mesh_force_at_rest(helical):
     force = helical.mesh_force
     rest = helical.rest
-    held = helical.system().stiffness @ rest + force * helical.approach_direction()
+    held = (
+        helical.equations.governed_stiffness @ rest
+        + force * helical.approach_direction()
+    )
     moving = [not name.endswith("rotation") for name in helical.dofs]
 
     assert_close(held[moving], 0.0, atol=1e-9 * force)

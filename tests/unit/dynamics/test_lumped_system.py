@@ -10,17 +10,13 @@ from lane_tools import BRIEF, laws, motion_of, right_hand_side
 
 from gensig.dynamics._vector import LANES
 from gensig.dynamics.backends.nystroem.machine_lanes import pack
+from gensig.dynamics.bodies import HOUSING, Bodies, Motion, Spring
 from gensig.dynamics.equations import Equations
-from gensig.dynamics.system import LumpedSystem
 from gensig.errors import SimulationError
 
-OSCILLATOR = LumpedSystem(
-    names=("a", "b"),
-    mass=np.array([2.0, 3.0]),
-    stiffness=np.diag([50.0, 0.0]),
-    damping=np.diag([4.0, 0.0]),
-    force=np.zeros(2),
-    rotation=np.zeros(2),
+OSCILLATOR = Bodies(
+    motions=(Motion("a", 2.0), Motion("b", 3.0)),
+    springs=(Spring(0, HOUSING, 50.0, 4.0), Spring(0, 1, 0.0, 0.0)),
 )
 SOFT = {
     "gear.pinion.support.stiffness_x_n_per_m": 0.0,
@@ -45,30 +41,25 @@ LIGHT = {
     ("changes", "text"),
     [
         (
-            {"mass": np.array([1.0, 0.0])},
+            {"motions": (Motion("a", 1.0), Motion("b", 0.0))},
             "mass or inertia of 'b' must be positive",
         ),
-        (
-            {"stiffness": np.array([[5.0, -5.0], [0.0, 5.0]])},
-            "stiffness matrix is not symmetric",
-        ),
-        (
-            {"damping": np.array([[0.0, 1.0], [-1.0, 0.0]])},
-            "damping matrix is not symmetric",
-        ),
-        (
-            {"damping": np.diag([-1.0, 0.0])},
-            "damping matrix would feed energy in",
-        ),
-        (
-            {"stiffness": np.diag([1.0, -1.0])},
-            "stiffness matrix would feed energy in",
-        ),
+        ({"springs": (Spring(0, 1, -1.0, 0.0),)}, "spring of 'a' would feed energy in"),
+        ({"springs": (Spring(1, HOUSING, 1.0, -1.0),)}, "'b' .* damping -1"),
+        ({"springs": (Spring(1, 0, np.nan, 0.0),)}, "stiffness nan"),
     ],
 )
-def test_impossible_systems_are_refused(changes, text):
+def test_impossible_bodies_are_refused(changes, text):
     with pytest.raises(SimulationError, match=text):
         replace(OSCILLATOR, **changes)
+
+
+def test_a_spring_acts_on_both_ends_and_the_housing_stands_still():
+    between = Spring(0, 1, 7.0, 0.5, loss=0.2)
+    bodies = replace(OSCILLATOR, springs=(*OSCILLATOR.springs, between))
+    assert bodies.stiffness.tolist() == [[57.0, -7.0], [-7.0, 7.0]]
+    assert bodies.damping.tolist() == [[4.5, -0.5], [-0.5, 0.5]]
+    assert bodies.loss.tolist() == [[0.2, -0.2], [-0.2, 0.2]]
 
 
 def test_rates_of_an_oscillator():
@@ -114,7 +105,7 @@ def test_a_group_holds_the_matrices_of_each_machine(machine, dynamics_of, kinds,
         held = group.held[lane::LANES]
         slowed = {"stiffness": 1.0, "damping": group.held_damping[lane]}[name]
         matrix += slowed * np.outer(held, held)
-        assert_close(matrix, getattr(dynamics.system(), name), 1e-15)
+        assert_close(matrix, getattr(dynamics.equations, f"governed_{name}"), 1e-15)
 
 
 def test_one_compiled_program_takes_every_machine(machine, dynamics_of):
@@ -140,7 +131,7 @@ def test_the_compiled_right_hand_side_is_that_of_the_matrices(
     """M q'' = f - K q - C v + mesh forces, also in a step that recentres the rotations."""
     dynamics = dynamics_of(machine(changes))
     rng = np.random.default_rng(6)
-    system = dynamics.system()
+    system = dynamics.equations
     n = len(dynamics.dofs)
     pinion, wheel = (gear.base_radius for gear in dynamics.table.pair.gears.values())
     for _ in range(10):
@@ -163,11 +154,11 @@ def test_the_compiled_right_hand_side_is_that_of_the_matrices(
             -normal,
             wheel * normal + moment_w,
         )
-        held = system.stiffness @ q + system.damping @ v
-        expected = system.force - held + mesh
+        held = system.governed_stiffness @ q + system.governed_damping @ v
+        expected = dynamics.set_force - held + mesh
 
         force = system.mass * right_hand_side(dynamics, time, q, v)
-        stiff = np.abs(system.stiffness) @ np.abs(q)
-        terms = np.abs(system.force) + stiff + np.abs(mesh)
+        stiff = np.abs(system.governed_stiffness) @ np.abs(q)
+        terms = np.abs(dynamics.set_force) + stiff + np.abs(mesh)
         assert normal > 0
         assert_close(force / terms, expected / terms, atol=1e-9)

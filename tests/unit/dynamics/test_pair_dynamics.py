@@ -48,7 +48,7 @@ def recorded(system, dynamics, **changes):
 def test_static_start_is_in_equilibrium(xiamen, dynamics_of, phase):
     dynamics = dynamics_of(xiamen, phase=phase)
     q = dynamics.static_start(0.0)
-    stiffness = dynamics.system().stiffness
+    stiffness = dynamics.equations.governed_stiffness
     approach = q @ dynamics.approach_direction()
     force = laws(dynamics, [(dynamics.teeth.start_roll, approach, 0.0, 0.0)])[0, 0]
 
@@ -83,7 +83,7 @@ def test_friction_torque_is_the_imbalance_of_drive_and_load(
 ):
     dynamics = dynamics_of(xiamen)
     torque = dynamics.friction_torque()
-    force = dynamics.system().force
+    force = dynamics.set_force
     # Niemann & Winter: loss factor of a constant load over the path of contact
     pair = xiamen.pair
     pitch = xiamen.pair.base_pitch
@@ -217,8 +217,9 @@ class TestRefusals:
             machine({key: value}).check()
 
     def test_its_frequency_is_told_in_hz(self, machine, xiamen, dynamics_of):
-        system = dynamics_of(xiamen).system()
-        stiffness, mass = 1e14, system.mass[system.names.index("pinion_y")]
+        dynamics = dynamics_of(xiamen)
+        place = dynamics.dofs.index("pinion_y")
+        stiffness, mass = 1e14, dynamics.equations.mass[place]
         with pytest.raises(SimulationError) as refused:
             machine({"gear.pinion.support.stiffness_y_n_per_m": stiffness}).check()
         (told,) = re.findall(r"pinion_y at (\S+) Hz", str(refused.value))

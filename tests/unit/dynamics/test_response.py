@@ -49,7 +49,7 @@ def test_across_the_line_of_action_a_gear_is_one_mass_on_its_support(
 def test_it_solves_the_equations_of_motion(xiamen, dynamics_of, rotors, name):
     """M x'' + C x' + K x = F with the mesh as a spring and a damper."""
     dynamics = replace(dynamics_of(xiamen), **rotors)
-    system = dynamics.system()
+    system = dynamics.equations
     direction = dynamics.approach_direction()
     dof = dynamics.dofs.index(name)
     w = 2.0 * np.pi * 240.0
@@ -59,7 +59,7 @@ def test_it_solves_the_equations_of_motion(xiamen, dynamics_of, rotors, name):
     speed = acceleration / (1j * w)
     moved = speed / (1j * w)
     mesh = dynamics.mean_mesh_stiffness * moved + dynamics.mesh_damping * speed
-    held = system.stiffness @ moved + system.damping @ speed
+    held = system.governed_stiffness @ moved + system.governed_damping @ speed
     force = system.mass * acceleration + held + direction * (direction @ mesh)
 
     assert_close(force, np.eye(len(force))[dof], atol=1e-9)

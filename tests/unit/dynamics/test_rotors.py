@@ -10,7 +10,7 @@ from chord_tables import repeated
 from closeness import assert_close
 from scipy.optimize import brentq
 
-from gensig.dynamics import mesh_statics
+from gensig.dynamics import mesh_teeth
 from gensig.dynamics.lanes import near_positions
 from gensig.dynamics.pair import DOFS, PAIR_DOFS, Rotor
 from gensig.errors import ConfigError
@@ -91,9 +91,9 @@ def ends(dynamics):
 
 def drive_matrices(dynamics):
     """Spring and damper of the drive alone, (dof, dof) each."""
-    system = dynamics.system()
+    system = dynamics.equations
     operating = dynamics.operating
-    unit = np.zeros(system.stiffness.shape)
+    unit = np.zeros(system.governed_stiffness.shape)
     unit[ends(dynamics)[0], ends(dynamics)[0]] = 1.0
     rate = 2 * math.pi * operating.drive_frequency
     reduced = system.rotation**2 @ system.mass
@@ -103,7 +103,7 @@ def drive_matrices(dynamics):
 
 def residual(dynamics, time, q):
     """Remaining forces and torques at a state at rest in the rotating frame, (dof,)."""
-    system = dynamics.system()
+    system = dynamics.equations
     nominal = dynamics.operating.nominal(np.array([time]))
     radius = dynamics.table.pair.pinion.base_radius
     direction = dynamics.approach_direction()
@@ -116,20 +116,24 @@ def residual(dynamics, time, q):
 
     force = brentq(excess, 1e-3, 1e5, rtol=1e-12)
     inertia = system.mass * system.rotation * nominal.acceleration
-    applied = system.force * nominal.torque_factor - inertia - system.stiffness @ q
+    applied = (
+        dynamics.set_force * nominal.torque_factor
+        - inertia
+        - system.governed_stiffness @ q
+    )
     return applied - direction * force
 
 
 class TestEquations:
     def test_degrees_of_freedom(self, dynamics, rotors):
-        system = dynamics.system()
+        system = dynamics.equations
         direction = dynamics.approach_direction()
         names = (
             *PAIR_DOFS,
             *[f"{name}_rotation" for name in rotors],
         )
 
-        assert dynamics.dofs == system.names == names
+        assert dynamics.dofs == dynamics.bodies.names == names
         assert set(dynamics.dofs) <= set(DOFS)
         assert system.mass[6:].tolist() == [rotor.inertia for rotor in rotors.values()]
         assert direction.shape == (len(dynamics.dofs),)
@@ -146,12 +150,12 @@ class TestEquations:
 
     def test_a_common_rotation_strains_only_the_drive(self, dynamics):
         system, (drive_k, drive_c) = (
-            dynamics.system(),
+            dynamics.equations,
             drive_matrices(dynamics),
         )
         matrices = (
-            (system.stiffness, drive_k),
-            (system.damping, drive_c),
+            (system.governed_stiffness, drive_k),
+            (system.governed_damping, drive_c),
         )
         for matrix, drive in matrices:
             strain = (matrix - drive) @ system.rotation
@@ -162,12 +166,12 @@ class TestEquations:
 
     def test_the_drive_holds_all_that_rotates(self, dynamics, smooth):
         """At its frequency and damping ratio for every machine."""
-        system = dynamics.system()
+        system = dynamics.equations
         operating = smooth.operating
         rotation = system.rotation
         inertia = rotation @ np.diag(system.mass) @ rotation
-        rate = math.sqrt(rotation @ system.stiffness @ rotation / inertia)
-        damping = rotation @ system.damping @ rotation
+        rate = math.sqrt(rotation @ system.governed_stiffness @ rotation / inertia)
+        damping = rotation @ system.governed_damping @ rotation
 
         assert_close(
             rate / (2 * math.pi),
@@ -181,11 +185,11 @@ class TestEquations:
         )
 
     def test_torques_act_at_the_ends_and_balance(self, dynamics, smooth):
-        system = dynamics.system()
+        system = dynamics.equations
         lead = np.zeros(len(dynamics.dofs))
         if dynamics.motor:
             lead[6] = smooth.operating.torque / MOTOR.coupling_stiffness
-        driving = system.force - drive_matrices(dynamics)[0] @ lead
+        driving = dynamics.set_force - drive_matrices(dynamics)[0] @ lead
 
         assert np.flatnonzero(driving).tolist() == sorted(ends(dynamics))
         assert_close(
@@ -356,7 +360,7 @@ class TestMeanStiffness:
     def test_it_is_that_of_the_commonest_teeth(self, smooth):
         table = smooth.mesh_table()
         force = smooth.mesh_force
-        sound = mesh_statics.mean_mesh_stiffness(table, force)
+        sound = mesh_teeth.mean_mesh_stiffness(table, force)
         of_pinion, of_wheel = table.parts
         doubled = repeated(of_pinion, 2)
         doubled.compliance[1] *= 2.0
@@ -367,7 +371,7 @@ class TestMeanStiffness:
             kind = (np.arange(23) < n_soft).astype(int)
             pinion = GearTeeth(kind=kind, present=present)
             changed = replace(table, pinion=pinion, parts=parts)
-            return mesh_statics.mean_mesh_stiffness(changed, force)
+            return mesh_teeth.mean_mesh_stiffness(changed, force)
 
         assert softer(11) == sound
         assert softer(12) == softer(23) < 0.8 * sound

@@ -233,8 +233,7 @@ def test_a_neighbour_turns_a_gear_as_the_set_torque_does(
 ):
     """Its mesh is what drives a driving gear and what holds a driven one back."""
     tones = tones_of("neighbour_mesh", {"gear": gear})
-    system = dynamics.system()
-    outside = system.force[list(system.names).index(turn)]
+    outside = dynamics.set_force[dynamics.dofs.index(turn)]
     along = tones.force[:, 0] / math.cos(math.radians(60))
     arm = tones.force[:, 2] / along
 

@@ -13,7 +13,6 @@ from functools import lru_cache
 import numpy as np
 from scipy.signal import resample
 
-from gensig.dynamics.system import LumpedSystem
 from gensig.signals.averaging import remove_orders
 from gensig.signals.indicators import kurtosis, rms
 from gensig.signals.spectrum import amplitude_spectrum
@@ -150,11 +149,13 @@ def _natural_frequency(case: Case, at: str) -> float:
     """
     stiffness, mode = at.split()
     dynamics = pair_dynamics(case)
-    system: LumpedSystem = dynamics.system()
+    system = dynamics.equations
     direction = dynamics.approach_direction()
-    matrix = system.stiffness + float(stiffness) * np.outer(direction, direction)
+    matrix = system.governed_stiffness + float(stiffness) * np.outer(
+        direction, direction
+    )
     along = [
-        index for index, name in enumerate(system.names) if not name.endswith("_x")
+        index for index, name in enumerate(dynamics.dofs) if not name.endswith("_x")
     ]
     reduced = matrix[np.ix_(along, along)] / system.mass[along][:, None]
     frequency = np.sqrt(np.sort(np.abs(np.linalg.eigvals(reduced)))) / (2.0 * np.pi)
@@ -163,10 +164,11 @@ def _natural_frequency(case: Case, at: str) -> float:
 
 def _support_frequency(case: Case, at: str) -> float:
     """Undamped frequency in Hz of one gear on its own support; ``at`` is its degree of freedom."""
-    system = pair_dynamics(case).system()
-    index = system.names.index(at)
+    dynamics = pair_dynamics(case)
+    system, index = dynamics.equations, dynamics.dofs.index(at)
     return float(
-        np.sqrt(system.stiffness[index, index] / system.mass[index]) / (2.0 * np.pi)
+        np.sqrt(system.governed_stiffness[index, index] / system.mass[index])
+        / (2.0 * np.pi)
     )
 
 

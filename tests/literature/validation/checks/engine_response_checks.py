@@ -17,11 +17,11 @@ from gensig.driveline.excitation.engine_torques import (
 )
 from gensig.driveline.linear.forced import (
     Elements,
-    LinearLine,
     SteadyResponse,
     over_cycle,
     steady_response,
 )
+from gensig.dynamics.linear_system import LinearSystem
 from gensig.options.compose import compose
 
 ForcedCheck = Callable[["ForcedCase", str], float]
@@ -54,7 +54,7 @@ class ForcedCase:
     ``mesh_names``: the two nodes with a slash.
     """
 
-    line: LinearLine
+    line: LinearSystem
     meshes: Elements
     mesh_names: tuple[str, ...]
     nodes: tuple[int, ...]
