@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self, final
 
 import numpy as np
@@ -95,9 +96,9 @@ MOST_ENERGY_RESIDUAL = 1e-3
 
 
 @final
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class LineMachine(Machine):
-    """An engine or a motor on its drive line.
+    """An engine or a motor on its drive line. No slots: mean forces of its meshes are kept.
 
     Records follow the mesh ``mesh_number``; ``modification`` and ``heat`` as in ``ToothLaw``.
     """
@@ -200,7 +201,7 @@ class LineMachine(Machine):
         number = self.mesh_number
         return reference_force(self.engine, number, float(self.mesh_forces[number]))
 
-    @property
+    @cached_property
     def mesh_forces(self) -> Array:
         """Mean normal forces of all meshes at the set-point, (mesh,) N."""
         return mesh_forces(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -23,9 +24,11 @@ Position = TypeVar("Position", float, Array)
 SIDES = ("pinion", "wheel")  # the two gears of a pair, the driving one first
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class GearPair:
     """A pinion and the wheel that it drives, in the transverse section.
+
+    No slots: what follows from the fields is kept.
 
     Without ``center_distance_change`` the centre distance is the one that meshes without play.
     ``backlash`` is the play along the line of action that is left to the coast flank, m.
@@ -93,17 +96,17 @@ class GearPair:
         """Speed of a gear over the pinion's, positive."""
         return 1.0 / (self.gears[side].n_teeth / self.pinion.n_teeth)
 
-    @property
+    @cached_property
     def ratio(self) -> float:
         """Gear ratio z_wheel / z_pinion."""
         return self.wheel.n_teeth / self.pinion.n_teeth
 
-    @property
+    @cached_property
     def base_pitch(self) -> float:
         """Transverse base pitch, m."""
         return self.pinion.base_pitch
 
-    @property
+    @cached_property
     def working_pressure_angle(self) -> float:
         """Transverse pressure angle at the working centre distance."""
         alpha = self._angle_without_play
@@ -114,7 +117,7 @@ class GearPair:
             min(1.0, base / (base / math.cos(alpha) + self.center_distance_change))
         )
 
-    @property
+    @cached_property
     def _angle_without_play(self) -> float:
         """Transverse pressure angle at the centre distance that the profile shifts give."""
         shift = self.pinion.profile_shift + self.wheel.profile_shift
@@ -126,53 +129,53 @@ class GearPair:
             involute(alpha) + 2.0 * shift * math.tan(self.pinion.pressure_angle) / teeth
         )
 
-    @property
+    @cached_property
     def center_distance(self) -> float:
         """Working centre distance, m."""
         return (self.pinion.base_radius + self.wheel.base_radius) / math.cos(
             self.working_pressure_angle
         )
 
-    @property
+    @cached_property
     def tangent_length(self) -> float:
         """Length N1N2 between the tangent points on the base circles, m."""
         return (self.pinion.base_radius + self.wheel.base_radius) * math.tan(
             self.working_pressure_angle
         )
 
-    @property
+    @cached_property
     def start_curvature_radius(self) -> float:
         """Pinion curvature radius at A, where the wheel's tip meets the pinion's flank."""
         return self.tangent_length - math.sqrt(
             self.wheel.tip_radius**2 - self.wheel.base_radius**2
         )
 
-    @property
+    @cached_property
     def end_curvature_radius(self) -> float:
         """Pinion curvature radius at E, where the pinion's tip leaves."""
         return math.sqrt(self.pinion.tip_radius**2 - self.pinion.base_radius**2)
 
-    @property
+    @cached_property
     def path_of_contact(self) -> float:
         """Length of the path of contact A to E, m."""
         return self.end_curvature_radius - self.start_curvature_radius
 
-    @property
+    @cached_property
     def transverse_contact_ratio(self) -> float:
         """Mean number of pairs in contact, eps_alpha."""
         return self.path_of_contact / self.base_pitch
 
-    @property
+    @cached_property
     def face_width(self) -> float:
         """Width that both gears share, m."""
         return min(self.pinion.face_width, self.wheel.face_width)
 
-    @property
+    @cached_property
     def base_helix_angle(self) -> float:
         """Helix angle on the base cylinders without its sign, rad."""
         return abs(self.pinion.base_helix_angle)
 
-    @property
+    @cached_property
     def overlap_ratio(self) -> float:
         """Overlap ratio eps_beta = b sin(beta) / (pi m_n)."""
         return (
@@ -181,12 +184,12 @@ class GearPair:
             / (math.pi * self.pinion.normal_module)
         )
 
-    @property
+    @cached_property
     def total_contact_ratio(self) -> float:
         """Total contact ratio eps_gamma = eps_alpha + eps_beta."""
         return self.transverse_contact_ratio + self.overlap_ratio
 
-    @property
+    @cached_property
     def pitch_point(self) -> float:
         """Position s of the pitch point C, m."""
         return (

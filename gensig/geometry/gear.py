@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 from gensig.errors import GeometryError
 from gensig.geometry.involute import involute
@@ -13,9 +14,11 @@ from gensig.units import from_si, unit
 LARGEST_HELIX = 45.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Gear:
     """Geometry of one external gear, lengths in m, angles in rad.
+
+    No slots: what follows from the fields is kept.
 
     ``pressure_angle`` and ``normal_module`` are those of the basic rack, so of the normal
     section; coefficients count normal modules. All radii and half angles are of the transverse
@@ -102,34 +105,34 @@ class Gear:
                 f"at most {room:.4g}, where the rounding reaches the working flank"
             )
 
-    @property
+    @cached_property
     def transverse_module(self) -> float:
         """Transverse module m_t = m_n / cos(beta)."""
         return self.normal_module / math.cos(self.helix_angle)
 
-    @property
+    @cached_property
     def transverse_pressure_angle(self) -> float:
         """Transverse pressure angle, tan(alpha_t) = tan(alpha_n) / cos(beta)."""
         if self.helix_angle == 0.0:  # to the bit
             return self.pressure_angle
         return math.atan(math.tan(self.pressure_angle) / math.cos(self.helix_angle))
 
-    @property
+    @cached_property
     def base_helix_angle(self) -> float:
         """Helix angle on the base cylinder, sin(beta_b) = sin(beta) cos(alpha_n)."""
         return math.asin(math.sin(self.helix_angle) * math.cos(self.pressure_angle))
 
-    @property
+    @cached_property
     def pitch_radius(self) -> float:
         """Reference pitch radius r = m_t z / 2."""
         return 0.5 * self.transverse_module * self.n_teeth
 
-    @property
+    @cached_property
     def base_radius(self) -> float:
         """Base radius r_b = r cos(alpha_t)."""
         return self.pitch_radius * math.cos(self.transverse_pressure_angle)
 
-    @property
+    @cached_property
     def tip_radius(self) -> float:
         """Tip radius r_a, without tip shortening."""
         return (
@@ -137,23 +140,23 @@ class Gear:
             + (self.addendum_coefficient + self.profile_shift) * self.normal_module
         )
 
-    @property
+    @cached_property
     def root_radius(self) -> float:
         """Root radius r_f that the cutter's tip generates."""
         return self.pitch_radius - self._root_depth
 
-    @property
+    @cached_property
     def _root_depth(self) -> float:
         """Depth of the root circle below the pitch circle, m."""
         rack_depth = self.addendum_coefficient + self.clearance_coefficient
         return (rack_depth - self.profile_shift) * self.normal_module
 
-    @property
+    @cached_property
     def base_pitch(self) -> float:
         """Transverse base pitch p_bt, m."""
         return 2.0 * math.pi * self.base_radius / self.n_teeth
 
-    @property
+    @cached_property
     def half_tooth_angle_base(self) -> float:
         """Half tooth angle on the base circle, th_b."""
         return (
@@ -168,17 +171,17 @@ class Gear:
             math.acos(min(1.0, self.base_radius / radius))
         )
 
-    @property
+    @cached_property
     def cutter_tip_radius(self) -> float:
         """Radius of the rack's tip rounding, r_rho."""
         return self.cutter_tip_radius_coefficient * self.normal_module
 
-    @property
+    @cached_property
     def rounding_center_depth(self) -> float:
         """Distance a_1 from the pitch line to the centre of the rack's tip rounding."""
         return self._root_depth - self.cutter_tip_radius
 
-    @property
+    @cached_property
     def rounding_center_offset(self) -> float:
         """Distance b_1 from the tooth centreline to the rounding's centre, along the pitch line."""
         alpha, rounding = self.transverse_pressure_angle, self.cutter_tip_radius
@@ -190,19 +193,19 @@ class Gear:
             + rounding / math.cos(alpha)
         )
 
-    @property
+    @cached_property
     def root_half_angle(self) -> float:
         """Half angle theta_f = b_1 / r of the tooth where its root curve meets the root circle."""
         return self.rounding_center_offset / self.pitch_radius
 
-    @property
+    @cached_property
     def straight_flank_depth(self) -> float:
         """Depth below the pitch line at which the rack's straight flank ends, m."""
         return self.rounding_center_depth + self.cutter_tip_radius * math.sin(
             self.transverse_pressure_angle
         )
 
-    @property
+    @cached_property
     def junction_curvature_radius(self) -> float:
         """Curvature radius of the involute where the root curve joins it.
 

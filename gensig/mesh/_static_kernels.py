@@ -22,6 +22,62 @@ _compiled: Any = functools.partial(njit, nogil=True, cache=True, error_model="nu
 
 
 @_compiled
+def locate_pairs(
+    roll,
+    pitch,
+    first_pitch,
+    nodes,
+    upright,
+    present,
+    start,
+    pinion_kind,
+    wheel_kind,
+    pinion_error,
+    wheel_error,
+    pinion_tilt,
+    wheel_tilt,
+    position,
+    cell,
+    share,
+    pinion,
+    wheel,
+    back,
+):
+    """Where pairs of teeth stand at rolls of the pinion, of which kinds they are, and their errors.
+
+    Parameters
+    ----------
+    roll : (phase,) m
+    nodes : first and last position of the table, m, and the number of its cells
+    upright : m            position where tilts add nothing
+    present : (pinion kind, wheel kind)
+    start : teeth of pinion and wheel in pair 0
+    pinion_kind, ... : (tooth,)    kinds, errors in m and tilts in m/m
+    position, share, back : (phase, pair)    written: m, relative position in the cell, and m by
+        which the pair stands back; inf for a missing tooth
+    cell, pinion, wheel : (phase, pair)      written: cell of the table, and kinds
+    """
+    low, high, n_cells = nodes
+    per_meter = n_cells / (high - low)
+    for i in range(roll.shape[0]):
+        newest = int(np.floor(roll[i] / pitch)) - first_pitch
+        for j in range(position.shape[1]):
+            index = newest - j
+            here = roll[i] - index * pitch
+            x = min(max((here - low) * per_meter, 0.0), float(n_cells))
+            node = max(min(int(x), n_cells - 1), 0)
+            tooth_a = (index + start[0]) % pinion_kind.shape[0]
+            tooth_b = (index + start[1]) % wheel_kind.shape[0]
+            tilt = pinion_tilt[tooth_a] + wheel_tilt[tooth_b]
+            error = pinion_error[tooth_a] + wheel_error[tooth_b]
+            position[i, j], cell[i, j], share[i, j] = here, node, x - node
+            pinion[i, j], wheel[i, j] = pinion_kind[tooth_a], wheel_kind[tooth_b]
+            back[i, j] = error + tilt * (here - upright)
+            if not present[pinion[i, j], wheel[i, j]]:
+                back[i, j] = np.inf
+
+
+@_compiled
 def add_part(soft, back, pinion, wheel, cell, share, compliance, gap):
     """Add a part of a table to the compliances and gaps of pairs.
 

@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import Tooth
 from gensig.material import Material
-from gensig.mesh._static_kernels import add_part, share_over_pairs
+from gensig.mesh._static_kernels import (
+    add_part,
+    locate_pairs,
+    share_over_pairs,
+)
 from gensig.mesh.modification import PLAIN, PairModification
 from gensig.mesh.options import MeshOptions
 from gensig.mesh.pair_table import pair_table
@@ -49,15 +53,6 @@ class StaticMesh:
     stiffness: Array
 
 
-def cells(nodes: Array, position: Array) -> tuple[NDArray[np.int64], Array]:
-    """Cells between equally spaced nodes that hold the positions, and relative positions there."""
-    n_cells = len(nodes) - 1
-    scaled = (position - nodes[0]) * (n_cells / (nodes[-1] - nodes[0]))
-    scaled = np.clip(scaled, 0.0, n_cells)
-    cell = np.minimum(scaled.astype(np.int64), n_cells - 1)
-    return np.maximum(cell, 0), scaled - cell
-
-
 OfTeeth = tuple[Array | None, Array | None]  # of pinion and wheel, (tooth,); None: 0
 
 
@@ -87,32 +82,36 @@ def pair_states(
 
     Errors and tilts of the teeth are those of the middle of the face.
     """
-    pitch = table.pair.base_pitch
-    newest = np.floor(roll / pitch).astype(np.int64) - table.first_pitch
-    index = newest[:, None] - np.arange(table.n_pairs)
-    position = roll[:, None] - index * pitch
-    cell, share = cells(table.position, position)
-    beyond = position - table.pair.pitch_point - table.half_lag
-    kinds, back = [], np.zeros(position.shape)
-    gears = zip(
-        (table.pinion, table.wheel),
-        meeting.start_teeth,
-        meeting.errors,
-        meeting.tilts,
-        strict=True,
+    gears, n_nodes = (table.pinion, table.wheel), len(table.position)
+    errors, tilts = (
+        [_of_teeth(each, teeth) for each, teeth in zip(values, gears, strict=True)]
+        for values in (meeting.errors, meeting.tilts)
     )
-    for teeth, start, errors, tilts in gears:
-        tooth = (index + start) % len(teeth.kind)
-        kinds.append(teeth.kind[tooth])
-        back += (
-            _of_teeth(errors, teeth)[tooth] + _of_teeth(tilts, teeth)[tooth] * beyond
-        )
-    back[~table.present[kinds[0], kinds[1]]] = np.inf
-    shape = *position.shape, len(table.depth)
-    compliance = np.full(shape, -table.shared_compliance)
-    gap = np.broadcast_to(back[:, :, None], shape).copy()
+    shape = len(roll), table.n_pairs
+    position, share, back = np.empty(shape), np.empty(shape), np.empty(shape)
+    cell, pinion, wheel = np.empty((3, *shape), dtype=np.int64)
+    locate_pairs(
+        roll,
+        table.pair.base_pitch,
+        table.first_pitch,
+        (table.position[0], table.position[-1], n_nodes - 1),
+        table.pair.pitch_point + table.half_lag,
+        table.present,
+        meeting.start_teeth,
+        *(teeth.kind for teeth in gears),
+        *errors,
+        *tilts,
+        position,
+        cell,
+        share,
+        pinion,
+        wheel,
+        back,
+    )
+    compliance = np.full((*shape, len(table.depth)), -table.shared_compliance)
+    gap = np.repeat(back[:, :, None], len(table.depth), axis=2)
     for part in table.parts:
-        add_part(part.compliance, part.gap, *kinds, cell, share, compliance, gap)
+        add_part(part.compliance, part.gap, pinion, wheel, cell, share, compliance, gap)
     return PairStates(compliance=compliance, gap=gap, position=position)
 
 
