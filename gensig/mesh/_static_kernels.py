@@ -43,7 +43,7 @@ def locate_pairs(
     wheel,
     back,
 ):
-    """Where pairs of teeth stand at rolls of the pinion, of which kinds they are, and their errors.
+    """Write positions, kinds and errors of pairs of teeth at rolls of the pinion.
 
     Parameters
     ----------
