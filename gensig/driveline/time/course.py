@@ -74,14 +74,15 @@ def constant_speed(speed: float) -> LineCourse:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ShaftTorque:
-    """A torque on one degree of freedom over the angle that it has itself turned; both count as
-    it nominally rotates.
+    """A torque on one degree of freedom over the angle that a shaft has turned; both count as
+    they nominally rotate. On a translation it is a force along it.
 
     ``table`` (node,) N m stands at equal distances over ``period`` rad of that angle and is
     periodic, straight between nodes; one number alone is constant. At time 0 the line stands
     ``phase`` rad into it. ``factor`` (knot,) multiplies it over the knots of the course; None is
-    1. A torque over time alone is a constant 1 with a factor in N m. On a translation it is a
-    force along it, with one number only.
+    1. A torque over time alone is a constant 1 with a factor in N m. ``turned_by`` is the degree of
+    freedom whose angle it follows, None its own: an unbalance acts on x and y over the angle of
+    its shaft.
     """
 
     dof: int
@@ -89,6 +90,14 @@ class ShaftTorque:
     period: float = 2.0 * np.pi
     phase: float = 0.0
     factor: Array | None = None
+    turned_by: int | None = None
+
+    @property
+    def turning(self) -> int:
+        """Degree of freedom whose angle the torque follows."""
+        if self.turned_by is None:
+            return self.dof
+        return self.turned_by
 
     def __post_init__(self) -> None:
         if (

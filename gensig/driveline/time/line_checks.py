@@ -61,15 +61,16 @@ def check_torques(
     """Raise ConfigError for torques that a line of so many knots of its course cannot have."""
     n = len(names)
     for number, torque in enumerate(torques):
-        if not 0 <= torque.dof < n:
-            raise ConfigError(
-                f"torque {number}: degree of freedom {torque.dof} must lie in 0..{n - 1}"
-            )
+        for dof in (torque.dof, torque.turning):
+            if not 0 <= dof < n:
+                raise ConfigError(
+                    f"torque {number}: degree of freedom {dof} must lie in 0..{n - 1}"
+                )
         name = f"torque on '{names[torque.dof]}'"
-        if len(torque.table) > 1 and system.rotation[torque.dof] == 0.0:
+        if len(torque.table) > 1 and system.rotation[torque.turning] == 0.0:
             raise ConfigError(
-                f"{name}: a table over its angle needs a degree of freedom that turns; give one "
-                "number"
+                f"{name}: a table over the angle of '{names[torque.turning]}' needs a degree of "
+                "freedom that turns; give one number, or turned_by"
             )
         if torque.factor is not None and torque.factor.shape != (n_knots,):
             raise ConfigError(

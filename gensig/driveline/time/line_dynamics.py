@@ -69,13 +69,12 @@ class LineDynamics(Dynamics):
         return replace(self.system, sources=sources)
 
     def _over_angle(self, torque: ShaftTorque) -> OverAngle:
-        sense, n_nodes = self._sense(torque), len(torque.table)
-        per_rad = n_nodes / torque.period
+        per_rad = len(torque.table) / torque.period
         return OverAngle(
             dof=torque.dof,
-            turned_by=torque.dof,
-            nodes=sense * torque.table,
-            per_rad=sense * per_rad,
+            turned_by=torque.turning,
+            nodes=self._sense(torque.dof) * torque.table,
+            per_rad=self._sense(torque.turning) * per_rad,
             shift=torque.phase * per_rad,
         )
 
@@ -141,12 +140,12 @@ class LineDynamics(Dynamics):
 
     @property
     def sources(self) -> tuple[ShaftTorque, ...]:
-        """Torques that follow the angle of their degree of freedom."""
+        """Torques that follow the angle of a shaft."""
         return tuple(t for t in self.torques if len(t.table) > 1)
 
-    def _sense(self, torque: ShaftTorque) -> float:
-        """1 where the angle that a torque acts on counts as it nominally rotates, else -1."""
-        return math.copysign(1.0, float(self.system.rotation[torque.dof]))
+    def _sense(self, dof: int) -> float:
+        """1 where an angle counts as it nominally rotates, or of a translation, else -1."""
+        return math.copysign(1.0, float(self.system.rotation[dof]))
 
     def factors(self, times: Array) -> Array:
         """Factors of the sources at times in s, (time, source)."""
@@ -162,7 +161,7 @@ class LineDynamics(Dynamics):
         """Means of torques over their angle at times in s, (time, dof)."""
         forces = np.zeros((len(times), len(self.dofs)))
         for torque in torques:
-            mean = self._sense(torque) * float(torque.table.mean())
+            mean = self._sense(torque.dof) * float(torque.table.mean())
             forces[:, torque.dof] += mean * self._factor(torque, times)
         return forces
 

@@ -155,6 +155,43 @@ class TestTorquesAndCourse:
                 atol=5e-4 * np.abs(expected).max(),
             )
 
+    @pytest.mark.parametrize("sense", [1.0, -1.0])
+    def test_an_unbalance_turns_with_its_shaft(self, sense):
+        """A disc on springs along x and y under a force that turns with it: the exact orbit."""
+        mass, spring, damper, force = 2.0, 8e5, 60.0, 3.0
+        held = np.diag([0.0, spring, 0.5 * spring])
+        system = bodies(
+            np.array([0.1, mass, mass]),
+            held,
+            np.diag([0.0, damper, damper]),
+            np.array([sense, 0.0, 0.0]),
+        )
+        angle = np.arange(4096) / 4096 * 2 * np.pi
+        waves = {1: np.cos(angle), 2: sense * np.sin(angle)}
+        line = line_of(
+            system,
+            nominal=constant_speed(SPEED),
+            torques=[
+                ShaftTorque(dof=dof, table=force * wave, turned_by=0)
+                for dof, wave in waves.items()
+            ],
+        )
+        motion = integrate_line(
+            line,
+            steps(4000.0, 10),
+            duration=2 * np.pi / SPEED * 4,
+            lead_in=1.0,
+            channels=[("angle", 1), ("angle", 2)],
+        )
+        dynamic = np.diag(held)[1:] - mass * SPEED**2 + 1j * damper * SPEED
+        turned = np.exp(1j * motion.nominal_angle)
+        for dof, (stiff, turning) in enumerate(
+            zip(dynamic, (1.0, -1j * sense), strict=True), start=1
+        ):
+            expected = np.real(force * turning / stiff * turned)
+            found = motion.signals["angle", dof]
+            assert_close(found, expected, atol=5e-4 * np.abs(expected).max())
+
     def test_the_twist_shifts_the_torque(self):
         """A table over the angle sees the angle itself, not the nominal one: a restoring slope is
         a spring.

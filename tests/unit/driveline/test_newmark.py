@@ -120,6 +120,10 @@ class TestTorques:
                 r"degree of freedom 5 must lie in 0\.\.1",
             ),
             (
+                {"dof": 0, "table": np.ones(4), "turned_by": -1},
+                r"degree of freedom -1 must lie in 0\.\.1",
+            ),
+            (
                 {"dof": 0, "table": np.ones(1), "factor": np.ones(3)},
                 r"factor \(3,\) must be \(1,\)",
             ),
@@ -149,7 +153,7 @@ class TestTorques:
         line = with_system(chain(2), rotation=np.array([1.0, 0.0]))
         with refused(
             ConfigError,
-            "torque on 'disc_1': a table over its angle needs a degree of freedom that turns",
+            "torque on 'disc_1': a table over the angle of 'disc_1' needs a degree of freedom that",
         ):
             run(line, [ShaftTorque(dof=1, table=np.ones(4))])
 
