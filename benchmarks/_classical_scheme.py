@@ -95,7 +95,6 @@ def evaluate(mesh, approach, rate, roll_rate, work, wide, near):
             first,
             last,
             EVEN,
-            layout.MARGIN,
             zero,
             approach,
             rate,

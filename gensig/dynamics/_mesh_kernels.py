@@ -18,6 +18,7 @@ from gensig.dynamics._layout import (
     GAP,
     GAP_SLOPE,
     LAW,
+    MARGIN,
     MOST_PAIRS,
     N_LAW,
     PAIR_FORCE,
@@ -35,13 +36,12 @@ from gensig.dynamics._vector import (
     chosen,
     compiled,
     get_row,
-    inlined,
     set_row,
     spread,
     where_above,
     width,
 )
-from gensig.dynamics._written import call, either, written
+from gensig.dynamics._written import call, choose, either, fold, repeat, written
 from gensig.mesh.pair_table import N_PAIRS
 
 
@@ -98,7 +98,7 @@ def _lift(k, bent, lifted, work):
     return lifted + (bite - kept)
 
 
-@inlined
+@written
 def _total_load(numbers, rounds, first, last, slot, work):
     """Load of all pairs, and the sum of their stiffnesses.
 
@@ -106,39 +106,44 @@ def _total_load(numbers, rounds, first, last, slot, work):
     the loop ends after at most as many rounds as there are pairs.
     """
     zero, shared = spread(work, 0.0), get_row(numbers, SHARED)
-    total, stiffness = zero, zero
-    for _ in range(rounds):
-        stiffness, force = zero, zero
-        for k in range(first, last):
-            stiffness, force = _add_load(k, slot, stiffness, force, work)
+
+    def add(k, stiffness, force):
+        return _add_load(k, slot, stiffness, force, work)
+
+    def once(total, stiffness):
+        stiffness, force = fold(first, last, add, (zero, zero))
         total = force / (1.0 + shared * stiffness)
-        lifted = zero
-        for k in range(first, last):
-            lifted = _lift(k, shared * total, lifted, work)
-        if not any_above(lifted, zero):
-            break
-    return total, stiffness
 
+        def lift(k, lifted):
+            return (_lift(k, shared * total, lifted, work),)
 
-@inlined
-def _followed_damping(damping, elastic, work):
-    """Damping over the elastic force of a pair, at most what ``MOST_DAMPER`` allows."""
-    most = get_row(work, layout.MOST_DAMPER)
-    if any_above(damping * elastic, most):
-        damping = where_above(damping * elastic, most, most / elastic, damping)
-    return damping
+        (lifted,) = fold(first, last, lift, (zero,))
+        return any_above(lifted, zero), total, stiffness
+
+    return tuple(repeat(rounds, once, (zero, zero)))
 
 
 @written
-def _set_alone(numbers, k, slot, margin, total, stiffness, work):
+def _followed_damping(damping, elastic, work):
+    """Damping over the elastic force of a pair, at most what ``MOST_DAMPER`` allows."""
+    most = get_row(work, layout.MOST_DAMPER)
+
+    def limit():
+        return (where_above(damping * elastic, most, most / elastic, damping),)
+
+    return either(any_above(damping * elastic, most), limit, (damping,))[0]
+
+
+@written
+def _set_alone(numbers, k, slot, total, stiffness, work):
     """Set a pair's margin to its penetration into what the others deflect."""
     zero, shared = spread(work, 0.0), get_row(numbers, SHARED)
     bite = get_row(work, BITE + k)
     spring = get_row(work, pair_rows(slot, k) + STIFFNESS)
     others = stiffness - where_above(bite, zero, spring, zero)
-    deep = get_row(work, margin + k) - shared * total
+    deep = get_row(work, MARGIN + k) - shared * total
     alone = deep * ((1.0 + shared * stiffness) / (1.0 + shared * others))
-    set_row(work, margin + k, where_above(bite, zero, alone, deep))
+    set_row(work, MARGIN + k, where_above(bite, zero, alone, deep))
 
 
 @written
@@ -223,44 +228,54 @@ def _consistent(group, law, work):
     return law._replace(along=along)
 
 
-@inlined
+@written
 def one_sided_law(
-    group, first, last, slot, margin, ahead, approach, approach_rate, roll_rate, work
+    group, first, last, slot, ahead, approach, approach_rate, roll_rate, work
 ):
     """One-sided contact of the gathered pairs, ``ahead`` m of roll after their reading.
 
-    Rows ``margin`` take the penetration of every pair into the body that the others deflect,
-    negative without contact, and ``PAIR_FORCE`` its normal force; none if ``margin`` is negative.
+    Rows ``MARGIN`` take the penetration of every pair into the body that the others deflect,
+    negative without contact, and ``PAIR_FORCE`` its normal force.
     The damping of helical teeth follows the gap of their first touch, because the gaps of chords
     jump from one to the next. The energy that the springs of chords leave out is stored too.
     """
     numbers = group.numbers
     damping = get_row(numbers, layout.DAMPING)
-    for k in range(first, last):
+
+    def touch(k):
         bite = _touch(k, slot, ahead, approach, work)
-        if margin >= 0:
-            set_row(work, margin + k, bite)
+        set_row(work, MARGIN + k, bite)
+        return ()
+
+    fold(first, last, touch, ())
     rounds = MOST_PAIRS if is_helical(group) else N_PAIRS
     total, stiffness = _total_load(numbers, rounds, first, last, slot, work)
-    law = _of_shared(numbers, total, work)
-    for k in range(first, last):
-        if margin >= 0:
-            _set_alone(numbers, k, slot, margin, total, stiffness, work)
+
+    def rate_of(k):
+        return approach_rate - _damped_slope(group, k, slot, work) * roll_rate
+
+    def press(k, *law):
+        _set_alone(numbers, k, slot, total, stiffness, work)
         elastic = _touching_force(numbers, k, slot, total, work)
-        rate = approach_rate - _damped_slope(group, k, slot, work) * roll_rate
+        rate = rate_of(k)
         damped = 1.0 + _followed_damping(damping, elastic, work) * rate
-        law, force = _with_pair(group, law, k, slot, elastic, damped, rate, ahead, work)
-        if margin >= 0:
-            set_row(work, PAIR_FORCE + k, force)
-            set_row(work, layout.PAIR_DAMPED + k, damped)
+        pressed = elastic, damped, rate, ahead
+        law, force = _with_pair(group, Law(*law), k, slot, *pressed, work)
+        set_row(work, PAIR_FORCE + k, force)
+        set_row(work, layout.PAIR_DAMPED + k, damped)
+        return law
+
+    def leave_out(k, *law):
+        elastic, rate = _elastic_force(numbers, k, slot, total, work), rate_of(k)
+        followed = _followed_damping(damping, elastic, work)
+        pressed = elastic, followed, rate, ahead
+        return _with_chord(group, Law(*law), k, slot, *pressed, work)
+
+    law = fold(first, last, press, _of_shared(numbers, total, work))
     if is_helical(group):
         set_row(work, layout.TOTAL, total)
-        for k in range(first, last):
-            elastic = _elastic_force(numbers, k, slot, total, work)
-            rate = approach_rate - _damped_slope(group, k, slot, work) * roll_rate
-            followed = _followed_damping(damping, elastic, work)
-            law = _with_chord(group, law, k, slot, elastic, followed, rate, ahead, work)
-    return _consistent(group, law, work)
+        law = fold(first, last, leave_out, law)
+    return _consistent(group, Law(*law), work)
 
 
 @written
@@ -288,40 +303,39 @@ def _add_share(k, slot, share, stiffness, loaded, work):
     return stiffness + of_pair, loaded
 
 
-@inlined
-def papers_law(
-    numbers, first, last, slot, margin, ahead, approach, approach_rate, work
-):
+@written
+def papers_law(numbers, first, last, slot, ahead, approach, approach_rate, work):
     """F = k(t) delta + c_m delta': two-sided, no gap, pairs switched over one integration step.
 
-    Rows ``margin`` take the share of every pair in contact, from 0 to 1 and beyond, ``PAIR_FORCE``
-    its force; none if ``margin`` is negative.
+    Rows ``MARGIN`` take the share of every pair in contact, from 0 to 1 and beyond, ``PAIR_FORCE``
+    its force.
     """
     zero, one = spread(work, 0.0), spread(work, 1.0)
     shared, damping = get_row(numbers, SHARED), get_row(numbers, layout.DAMPING)
     half_lag = get_row(numbers, layout.HALF_LAG)
-    stiffness, loaded = zero, zero
-    for k in range(first, last):
+
+    def share_out(k, stiffness, loaded):
         share = _share(numbers, k, slot, ahead, work)
-        if margin >= 0:
-            set_row(work, margin + k, share)
-        stiffness, loaded = _add_share(k, slot, share, stiffness, loaded, work)
+        set_row(work, MARGIN + k, share)
+        return _add_share(k, slot, share, stiffness, loaded, work)
+
+    stiffness, loaded = fold(first, last, share_out, (zero, zero))
     together = stiffness / (1.0 + shared * stiffness)
     normal = together * approach + damping * approach_rate
     divisor = where_above(stiffness, zero, stiffness, one)
     per_stiffness = where_above(stiffness, zero, 1.0 / divisor, zero)
-    friction, moment_p, moment_w = zero, zero, zero
-    for k in range(first, last):
+
+    def press(k, friction, moment_p, moment_w):
         position = get_row(work, pair_rows(slot, k) + POSITION) + (ahead - half_lag)
         part = normal * get_row(work, BITE + k) * per_stiffness
-        if margin >= 0:
-            set_row(work, PAIR_FORCE + k, part)
+        set_row(work, PAIR_FORCE + k, part)
         sliding, moment, reaction = rubbed(numbers, position, part)
-        friction, moment_p = friction + sliding, moment_p + moment
-        moment_w = moment_w + reaction
+        return friction + sliding, moment_p + moment, moment_w + reaction
+
+    rubbing = fold(first, last, press, (zero, zero, zero))
     stored = 0.5 * together * approach * approach
     lost = damping * approach_rate * approach_rate
-    return Law(normal, friction, moment_p, moment_w, zero, stored, lost, loaded)
+    return Law._make([normal, *rubbing, zero, stored, lost, loaded])
 
 
 @compiled
@@ -412,32 +426,20 @@ def coast_law(group, lane, work, wide):
         rows[LAW + row] += law[row]
 
 
-@inlined
-def mesh_law(
-    group, first, last, slot, margin, turned, approach, rate, roll_rate, work, wide
-):
+@written
+def mesh_law(group, first, last, slot, turned, approach, rate, roll_rate, work, wide):
     """The law of the chosen kind in every lane, on either flank, ``turned`` m after ``BASE``."""
-    numbers = group.numbers
     ahead = turned - get_row(work, layout.AHEAD + slot)
-    if group.one_sided:
-        law = one_sided_law(
-            group,
-            first,
-            last,
-            slot,
-            margin,
-            ahead,
-            approach,
-            rate,
-            roll_rate,
-            work,
-        )
-        law = with_coast(group, law, turned, approach, rate, roll_rate, work, wide)
-    else:
-        law = papers_law(
-            numbers, first, last, slot, margin, ahead, approach, rate, work
-        )
-    return law
+    read = first, last, slot, ahead, approach, rate
+
+    def one_sided():
+        law = one_sided_law(group, *read, roll_rate, work)
+        return with_coast(group, law, turned, approach, rate, roll_rate, work, wide)
+
+    def papers():
+        return papers_law(group.numbers, *read, work)
+
+    return Law(*choose(group.one_sided, one_sided, papers))
 
 
 @written

@@ -49,7 +49,7 @@ from gensig.dynamics._vector import (
     where_above,
     width,
 )
-from gensig.dynamics._written import written
+from gensig.dynamics._written import fold, written
 
 
 class CubicMiddle(NamedTuple):
@@ -349,7 +349,7 @@ def _cubic_middle(p, q, m, distance, work):
     return before, after, middle
 
 
-@inlined
+@written
 def between(a, b, middle, first, last, work):
     """Fill the slot half-way between two: cubic in gap and compliance.
 
@@ -358,7 +358,8 @@ def between(a, b, middle, first, last, work):
     """
     begin, end = get_row(work, AHEAD + a), get_row(work, AHEAD + b)
     set_row(work, AHEAD + middle, 0.5 * (begin + end))
-    for k in range(first, last):
+
+    def fill(k):
         p, q, m = pair_rows(a, k), pair_rows(b, k), pair_rows(middle, k)
         for value in (COMPLIANCE, GAP):
             before, after, mean = _cubic_middle(
@@ -369,13 +370,20 @@ def between(a, b, middle, first, last, work):
         set_row(work, m + STIFFNESS, 1.0 / get_row(work, m + COMPLIANCE))
         position = get_row(work, p + POSITION) + get_row(work, q + POSITION)
         set_row(work, m + POSITION, 0.5 * position)
+        return ()
+
+    fold(first, last, fill, ())
 
 
-@inlined
+@written
 def chords_between(a, b, middle, first, last, work):
     """Fill the rows of chords in the slot half-way between two."""
     distance = get_row(work, AHEAD + b) - get_row(work, AHEAD + a)
-    for k in range(first, last):
+
+    def fill(k):
         p, q, m = chord_rows(a, k), chord_rows(b, k), chord_rows(middle, k)
         for value in (layout.LEFT_OUT, layout.TOUCH):
             _cubic_middle(p + value, q + value, m + value, distance, work)
+        return ()
+
+    fold(first, last, fill, ())

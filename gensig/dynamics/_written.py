@@ -268,6 +268,103 @@ def loop(count: Any, body: Callable[[Any], None]) -> None:
         body(Value(code, types.intp, place.index))
 
 
+def fold(
+    first: Any, last: Any, body: Callable[..., Sequence[Any]], values: Sequence[Any]
+) -> list[Any]:
+    """Values that a loop carries: ``body(place, *values)`` gives those of the next place.
+
+    The body is run once, for a place that is not known, from ``first`` to before ``last``.
+    """
+    if not _open:
+        for place in range(first, last):
+            values = body(place, *values)
+        return list(values)
+    code = _open[-1]
+    builder, (_, low), (_, high) = code.builder, code.typed(first), code.typed(last)
+    typed = [code.typed(value) for value in values]
+    kinds, given = [kind for kind, _ in typed], [llvm for _, llvm in typed]
+    before = builder.block
+    head, inside, after = (
+        builder.append_basic_block(name) for name in ("head", "inside", "after")
+    )
+    builder.branch(head)
+    builder.position_at_end(head)
+    place, carried = builder.phi(low.type), [builder.phi(each.type) for each in given]
+    builder.cbranch(builder.icmp_signed("<", place, high), inside, after)
+    builder.position_at_end(inside)
+    held = [Value(code, *each) for each in zip(kinds, carried, strict=True)]
+    changed = [
+        code.typed(each)[1] for each in body(Value(code, types.intp, place), *held)
+    ]
+    following = builder.add(place, low.type(1))
+    _carry([place, *carried], [low, *given], before)
+    _carry([place, *carried], [following, *changed], builder.block)
+    builder.branch(head)
+    builder.position_at_end(after)
+    return held
+
+
+def repeat(
+    most: int, body: Callable[..., Sequence[Any]], values: Sequence[Any]
+) -> list[Any]:
+    """Values after some rounds: ``body(*values)`` gives whether there is another, and the next.
+
+    The body is run once. There is one round at least, and at most ``most``.
+    """
+    if not _open:
+        for _ in range(most):
+            again, *values = body(*values)
+            if not again:
+                break
+        return list(values)
+    code = _open[-1]
+    builder, (_, limit) = code.builder, code.typed(most)
+    typed = [code.typed(value) for value in values]
+    kinds, given = [kind for kind, _ in typed], [llvm for _, llvm in typed]
+    before, none = builder.block, limit.type(0)
+    head, after = (builder.append_basic_block(name) for name in ("round", "done"))
+    builder.branch(head)
+    builder.position_at_end(head)
+    done, carried = builder.phi(limit.type), [builder.phi(each.type) for each in given]
+    held = [Value(code, *each) for each in zip(kinds, carried, strict=True)]
+    again, *changed = body(*held)
+    ends = [code.typed(each)[1] for each in changed]
+    following = builder.add(done, limit.type(1))
+    is_more = builder.and_(again.llvm, builder.icmp_signed("<", following, limit))
+    _carry([done, *carried], [none, *given], before)
+    _carry([done, *carried], [following, *ends], builder.block)
+    builder.cbranch(is_more, head, after)
+    builder.position_at_end(after)
+    return [Value(code, *each) for each in zip(kinds, ends, strict=True)]
+
+
+def _carry(phis: Sequence[Any], values: Sequence[Any], block: Any) -> None:
+    for phi, value in zip(phis, values, strict=True):
+        phi.add_incoming(value, block)
+
+
+def choose(
+    condition: Any, yes: Callable[[], Sequence[Any]], no: Callable[[], Sequence[Any]]
+) -> list[Any]:
+    """Values of one of two branches, both of which are run once."""
+    if not isinstance(condition, Value):
+        return list(yes() if condition else no())
+    code, ways = _open[-1], []
+    with code.builder.if_else(condition.llvm) as branches:
+        for branch, body in zip(branches, (yes, no), strict=True):
+            with branch:
+                typed = [code.typed(value) for value in body()]
+                ways.append((typed, code.builder.block))
+    result = []
+    (first, block), (second, other_block) = ways
+    for (kind, one), (_, other) in zip(first, second, strict=True):
+        phi = code.builder.phi(one.type)
+        _carry([phi], [one], block)
+        _carry([phi], [other], other_block)
+        result.append(Value(code, kind, phi))
+    return result
+
+
 def any_of(*conditions: Any) -> Any:
     """True where any of some conditions holds."""
     if not _open:

@@ -14,7 +14,18 @@ from gensig.dynamics._vector import (
     set_row,
     spread,
 )
-from gensig.dynamics._written import any_of, call, either, loop, traced, when, written
+from gensig.dynamics._written import (
+    any_of,
+    call,
+    choose,
+    either,
+    fold,
+    loop,
+    repeat,
+    traced,
+    when,
+    written,
+)
 
 
 class Parts(NamedTuple):
@@ -143,3 +154,45 @@ def test_traced_functions_are_run_once() -> None:
 
     calling(np.zeros(10 * LANES), 2, 0.0)
     assert bodies == ["run"]
+
+
+@traced
+def carried(rows, first, last, flags):
+    """Write sums of rows, doublings up to a bound and one of two values to rows 0 to 3."""
+    zero, one = spread(rows, 0.0), spread(rows, 1.0)
+
+    def add(k, total, count):
+        return total + get_row(rows, 4 + k), count + one
+
+    def double(value, rounds):
+        value = value + value
+        return any_above(spread(rows, 10.0), value), value, rounds + one
+
+    total, count = fold(first, last, add, (zero, zero))
+    doubled, rounds = repeat(3, double, (flags, zero))
+    is_set = any_above(flags, zero)
+    (either_one,) = choose(is_set, lambda: (total,), lambda: (count,))
+    for row, value in enumerate((count, doubled, rounds, either_one)):
+        set_row(rows, row, value)
+
+
+@compiled
+def run_carried(rows, first, last, flag):
+    carried(rows, first, last, spread(rows, flag))
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "flag", "doubled", "rounds"),
+    [(1, 4, 1.0, 8.0, 3), (0, 2, 6.0, 12.0, 1), (2, 2, 0.0, 0.0, 3)],
+)
+def test_loops_carry_values(first, last, flag, doubled, rounds) -> None:
+    """A range without places gives what it was given; rounds end with the first that says so."""
+    rows = np.zeros((8, LANES))
+    rows[4:] = np.arange(4 * LANES).reshape(4, LANES)
+    total = rows[4 + first : 4 + last].sum(axis=0)
+    run_carried(rows.ravel(), first, last, flag)
+    assert (rows[0] == last - first).all()
+    assert (rows[1] == doubled).all()
+    assert (rows[2] == rounds).all()
+    expected = total if flag > 0.0 else np.full(LANES, last - first)
+    np.testing.assert_array_equal(rows[3], expected)

@@ -16,13 +16,12 @@ from gensig.dynamics._vector import (
     chosen,
     compiled,
     get_row,
-    inlined,
     set_row,
     spread,
     where_above,
     width,
 )
-from gensig.dynamics._written import written
+from gensig.dynamics._written import choose, either, fold, loop, written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._kinks import (
     LEAST_DAMPED,
@@ -58,22 +57,34 @@ def _spring(slot, k, work):
     return get_row(work, pair_rows(slot, k) + layout.STIFFNESS)
 
 
-@inlined
+@written
 def keep_margins(group, instant, first, last, slot, work):
     """Turn the margins that the law has left into those of an instant.
 
     The one-sided law leaves penetrations into what the other pairs deflect.
     """
-    zero = spread(work, 0.0)
-    if not group.one_sided:
-        for k in range(first, last):
-            set_row(work, margin_row(instant, k), get_row(work, layout.MARGIN + k))
-        return
-    carrying = zero
-    for k in range(first, last):
-        carrying = carrying + _carrying(slot, k, work)
-    for k in range(first, last):
-        _keep_margin(group.numbers, instant, k, slot, carrying, work)
+
+    def add(k, carrying):
+        return (carrying + _carrying(slot, k, work),)
+
+    def one_sided():
+        (carrying,) = fold(first, last, add, (spread(work, 0.0),))
+
+        def keep(k):
+            _keep_margin(group.numbers, instant, k, slot, carrying, work)
+            return ()
+
+        return fold(first, last, keep, ())
+
+    def papers():
+        def keep(k):
+            margin = get_row(work, layout.MARGIN + k)
+            set_row(work, margin_row(instant, k), margin)
+            return ()
+
+        return fold(first, last, keep, ())
+
+    choose(group.one_sided, one_sided, papers)
 
 
 @written
@@ -98,14 +109,20 @@ def _keep_margin(numbers, instant, k, slot, carrying, work):
         set_row(work, ANY_DAMPED + k, damped)
 
 
-@inlined
+@written
 def begin_again(group, first, last, work):
     """Let the margins at the end of a step be those at the begin of the next one."""
-    for k in range(followed(group)):
-        margin = spread(work, OUT_OF_MESH)
-        if first <= k < last:
-            margin = _margin(END_AT, k, work)
-        set_row(work, margin_row(BEGIN_AT, k), margin)
+    outside = spread(work, OUT_OF_MESH)
+
+    def clear(k):
+        set_row(work, margin_row(BEGIN_AT, k), outside)
+
+    def keep(k):
+        set_row(work, margin_row(BEGIN_AT, k), _margin(END_AT, k, work))
+        return ()
+
+    loop(followed(group), clear)
+    fold(first, last, keep, ())
 
 
 @compiled
@@ -129,13 +146,25 @@ def count_anew(group, work, near):
             work[at(margin_row(BEGIN_AT, k), lane, n)] = margin
 
 
-@inlined
+@written
 def kinked(group, k, work):
     """1 where a pair takes up or releases its load in the step, else 0."""
     changed = _crosses(0.0, k, work)
-    if not group.one_sided:
-        changed = changed + _crosses(1.0, k, work)
-    return changed
+
+    def papers():
+        return (changed + _crosses(1.0, k, work),)
+
+    return choose(group.one_sided, lambda: (changed,), papers)[0]
+
+
+@written
+def any_kinked(group, first, last, work):
+    """More than 0 in lanes in which any pair takes up or releases its load in the step."""
+
+    def add(k, changed):
+        return (changed + kinked(group, k, work),)
+
+    return fold(first, last, add, (spread(work, 0.0),))[0]
 
 
 @written
@@ -156,14 +185,16 @@ def _missed_above(bound, k, work):
     return missed_moments(*_margins_above(bound, k, work), work)
 
 
-@inlined
+@written
 def _missed(group, k, work):
     """The moments of the margin's part that counts which Simpson's rule misses."""
     short, early = _missed_above(0.0, k, work)
-    if not group.one_sided:
+
+    def papers():
         over, over_early = _missed_above(1.0, k, work)
-        short, early = short - over, early - over_early
-    return short, early
+        return short - over, early - over_early
+
+    return tuple(choose(group.one_sided, lambda: (short, early), papers))
 
 
 @written
@@ -176,35 +207,39 @@ def _add(k, part, short, early, changed, work):
     set_row(work, ANY_EARLY + k, get_row(work, ANY_EARLY + k) + more)
 
 
-@inlined
+@written
 def _give(group, j, changed, first, last, work):
     """Correct the force of a pair under the one-sided law."""
     short, early = _missed(group, j, work)
     give(group, j, short, early, changed, first, last, work)
 
 
-@inlined
+@written
 def give(group, j, short, early, changed, first, last, work):
     """Add what is missed of the force of a pair, to which the other loaded pairs give way."""
     one, shared = spread(work, 1.0), get_row(group.numbers, layout.SHARED)
     others = others_carrying(j, first, last, work)
     _add(j, one, short, early, changed, work)
     given = shared / ((1.0 + shared * others) * get_row(work, ANY_DAMPED + j))
-    for i in range(first, last):
-        if i != j:
-            _give_way(i, given, short, early, changed, work)
+
+    def give_way(i):
+        _give_way(i, given, short, early, changed, work)
+        return ()
+
+    fold(first, j, give_way, ())
+    fold(j + 1, last, give_way, ())
 
 
-@inlined
+@written
 def others_carrying(j, first, last, work):
     """Stiffness of the pairs but one that carry in the middle of the step."""
-    zero, others = spread(work, 0.0), spread(work, 0.0)
-    for i in range(first, last):
-        if i != j:
-            loaded = _margin(MIDDLE_AT, i, work)
-            spring = _spring(MIDDLE, i, work)
-            others = others + where_above(loaded, zero, spring, zero)
-    return others
+    zero = spread(work, 0.0)
+
+    def add(i, others):
+        loaded, spring = _margin(MIDDLE_AT, i, work), _spring(MIDDLE, i, work)
+        return (others + where_above(loaded, zero, spring, zero),)
+
+    return fold(j + 1, last, add, fold(first, j, add, (zero,)))[0]
 
 
 @written
@@ -225,51 +260,68 @@ def _shared_part(numbers, i, work):
     return share * (get_row(numbers, layout.SHARED) * _spring(MIDDLE, i, work))
 
 
-@inlined
+@written
 def _switch(group, j, changed, approach, first, last, work):
     """Correct the force of a pair under the paper's law, whose share of contact is missed."""
-    together = spread(work, 1.0)
-    for i in range(first, last):
-        together = together + _shared_part(group.numbers, i, work)
+
+    def add(i, together):
+        return (together + _shared_part(group.numbers, i, work),)
+
+    (together,) = fold(first, last, add, (spread(work, 1.0),))
     per_share = _spring(MIDDLE, j, work) * approach / (together * together)
     short, early = _missed(group, j, work)
     _add(j, per_share, short, early, changed, work)
 
 
-@inlined
+@written
 def miss(group, approach, first, last, work):
     """Set what Simpson's rule misses of the force of every pair, and mark lanes with any."""
     zero = spread(work, 0.0)
-    any_changed = zero
     miss_nothing(first, last, work)
-    for k in range(first, last):
+
+    def look(k, any_changed):
         changed = kinked(group, k, work)
-        if any_above(changed, zero):
-            any_changed = any_changed + changed
-            if group.one_sided:
-                _give(group, k, changed, first, last, work)
-            else:
-                _switch(group, k, changed, approach, first, last, work)
+
+        def one_sided():
+            _give(group, k, changed, first, last, work)
+            return ()
+
+        def papers():
+            _switch(group, k, changed, approach, first, last, work)
+            return ()
+
+        def correct():
+            choose(group.one_sided, one_sided, papers)
+            return (any_changed + changed,)
+
+        return either(any_above(changed, zero), correct, (any_changed,))
+
+    (any_changed,) = fold(first, last, look, (zero,))
     set_row(work, rows.ANY_MISSED, any_changed)
 
 
-@inlined
+@written
 def miss_nothing(first, last, work):
     """Let nothing be missed of the force of any pair."""
     zero = spread(work, 0.0)
-    for k in range(first, last):
+
+    def clear(k):
         set_row(work, ANY_SHORT + k, zero)
         set_row(work, ANY_EARLY + k, zero)
+        return ()
+
+    fold(first, last, clear, ())
 
 
-@inlined
+@written
 def missed_law(group, forces, first, last, work):
     """The law of pair forces in the middle of the step, of which nothing is damped or stored."""
     zero = spread(work, 0.0)
-    law = layout.Law(zero, zero, zero, zero, zero, zero, zero, zero)
-    for k in range(first, last):
-        law = _with_missed(group, law, k, forces, work)
-    return law
+
+    def add(k, *law):
+        return _with_missed(group, layout.Law(*law), k, forces, work)
+
+    return layout.Law(*fold(first, last, add, 8 * (zero,)))
 
 
 @written

@@ -36,10 +36,10 @@ from gensig.dynamics._written import call, written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem import _slots
 from gensig.dynamics.backends.nystroem._any_law_kinks import (
+    any_kinked,
     begin_again,
     count_anew,
     keep_margins,
-    kinked,
     margin_row,
     miss,
     missed_law,
@@ -183,7 +183,6 @@ def _push_mesh(
         first,
         last,
         slot,
-        layout.MARGIN,
         rolled(group, m, since, q, machine, own),
         approach,
         rate,
@@ -202,12 +201,9 @@ def _push_mesh(
 @compiled
 def _end_mesh(group, m, mesh, machine, own, own_wide, counts, slot, step):
     """Correct the end of the step for the kinks of a mesh, and shift what it remembers."""
-    n, zero = width(own), spread(own, 0.0)
+    n = width(own)
     first, last = near_pairs(PART, n, counts)
-    changed = zero
-    for k in range(first, last):
-        changed = changed + kinked(mesh, k, own)
-    if any_above(changed, zero):
+    if any_above(any_kinked(mesh, first, last, own), spread(own, 0.0)):
         halfway, _ = motion(group, m, rows.MIDDLE_Q, rows.MIDDLE_V, machine)
         miss(mesh, halfway, first, last, own)
         _correct(group, mesh, m, step, first, last, machine, own)

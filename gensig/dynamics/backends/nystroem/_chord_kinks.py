@@ -23,13 +23,12 @@ from gensig.dynamics._vector import (
     at,
     compiled,
     get_row,
-    inlined,
     set_row,
     spread,
     where_above,
     width,
 )
-from gensig.dynamics._written import written
+from gensig.dynamics._written import either, fold, written
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._any_law_kinks import (
     count_anew,
@@ -88,22 +87,27 @@ def _compare_chords(numbers, slot, k, approach, work):
     set_row(work, kept + rows.BITTEN, local - touch)
 
 
-@compiled
+@written
 def miss_chords(group, slot, approach, first, last, work):
     """Set what Simpson's rule misses of the force of every pair that changes its chord.
 
     ``approach`` is that at the end of the step, whose slot is given.
     """
     zero = spread(work, 0.0)
-    any_changed = zero
     miss_nothing(first, last, work)
-    for k in range(first, last):
+
+    def look(k, any_changed):
         changed = _changes(group.numbers, slot, k, approach, work)
-        if any_above(changed, zero):
-            any_changed = any_changed + changed
+
+        def correct():
             others = others_carrying(k, first, last, work)
-            short, early = _missed(group.numbers, slot, k, approach, others, work)
-            give(group, k, short, early, changed, first, last, work)
+            missed = _missed(group.numbers, slot, k, approach, others, work)
+            give(group, k, *missed, changed, first, last, work)
+            return (any_changed + changed,)
+
+        return either(any_above(changed, zero), correct, (any_changed,))
+
+    (any_changed,) = fold(first, last, look, (zero,))
     set_row(work, rows.ANY_MISSED, any_changed)
 
 
@@ -118,7 +122,7 @@ def _growth(numbers, slot, k, approach, work):
     return get_row(work, kept + rows.MORE_STIFFNESS) * bitten
 
 
-@inlined
+@written
 def _changes(numbers, slot, k, approach, work):
     """1 where a pair goes from one chord to another near the begin of the step, else 0."""
     zero, one = spread(work, 0.0), spread(work, 1.0)
