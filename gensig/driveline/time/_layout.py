@@ -184,8 +184,6 @@ class Work(NamedTuple):
     roll_rate: Any
     free: Any
     approach: Any
-    before: Any
-    rate: Any
     right: Any
     near: Any
     matrix: Any

@@ -324,7 +324,7 @@ def _scratch(system: Equations) -> Work:
     return Work._make(
         [
             *np.zeros((4, n)),
-            *np.zeros((8, m)),
+            *np.zeros((6, m)),
             np.zeros((m, m)),
             np.zeros((m, layout.N_LAW)),
             np.zeros((m, layout.N_FLANKS, most, n_columns)),
