@@ -55,7 +55,8 @@ class Bodies:
                     f"the mass or inertia of '{motion.name}' must be positive"
                 )
         for spring in self.springs:
-            if not min(spring.stiffness, spring.damping, spring.loss) >= 0.0:
+            values = spring.stiffness, spring.damping, spring.loss
+            if not all(value >= 0.0 for value in values):
                 raise SimulationError(
                     f"the spring of '{self.motions[spring.first].name}' would feed energy in: "
                     f"stiffness {spring.stiffness:g}, damping {spring.damping:g} and loss "

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from gensig.dynamics.equations import Equations
 from gensig.dynamics.mesh_teeth import MeshTeeth
+from gensig.errors import SimulationError
 
 Array = NDArray[np.float64]
 
@@ -14,6 +15,7 @@ ROUNDS = 20
 SAME = 1e-12  # share of the deflection by which it changes in the last round
 LEAST = 1e-6  # share of the mean force of its teeth that a mesh carries at least
 STILL = (2.0 * np.pi * 1e-4) ** 2  # 1/s2, far below any drive that holds a mean speed
+OUT_OF_BOUNDS = 1e6  # m, rad, m/s or rad/s
 FREE = 1e-12  # share of the springs that hold a line which turns freely
 
 
@@ -30,11 +32,15 @@ def line_at_rest(
     is solved by Newton's method. A mesh stands on the flanks that its mean force presses together.
     One that the forces would open stands at their touch. What the springs and meshes of a free line
     do not balance accelerates it as a rigid body, and it is at rest in that motion.
+
+    Raises
+    ------
+    SimulationError    for forces on what nothing holds
     """
     stiffness, force = _held(system, force)
     n = len(force)
     if not system.meshes:
-        return np.asarray(np.linalg.solve(stiffness, force))
+        return _within_bounds(np.asarray(np.linalg.solve(stiffness, force)))
     reach = np.stack([mesh.push(n) for mesh in system.meshes])
     sense = np.where([mesh.mean_force < 0.0 for mesh in system.meshes], -1.0, 1.0)
     carried, q = sense * mean, np.zeros(n)
@@ -57,10 +63,19 @@ def line_at_rest(
         carried = sense * np.maximum(sense * scale * solution[n:], LEAST * mean)
         if np.abs(q - before).max() <= SAME * np.abs(q).max():
             break
-    return np.asarray(q)
+    return _within_bounds(np.asarray(q))
 
 
-def is_free(system: Equations) -> bool:
+def _within_bounds(deflection: Array) -> Array:
+    """A deflection that a line can have; SimulationError for another."""
+    if not np.abs(deflection).max() < OUT_OF_BOUNDS:
+        raise SimulationError(
+            "line: it does not come to rest under its mean torques; check torques and springs"
+        )
+    return deflection
+
+
+def _is_free(system: Equations) -> bool:
     """True for a line whose rotation as a whole no spring holds."""
     rotation, stiffness = system.rotation, system.governed_stiffness
     size = np.abs(rotation)
@@ -68,11 +83,11 @@ def is_free(system: Equations) -> bool:
     return held <= FREE * float(size @ np.abs(stiffness) @ size)
 
 
-def balanced(system: Equations, force: Array) -> Array:
+def _balanced(system: Equations, force: Array) -> Array:
     """Forces (dof,) less those that accelerate the line as a rigid body."""
     momentum = system.mass * system.rotation
     inertia = float(momentum @ system.rotation)
-    return force - momentum * (float(force @ system.rotation) / inertia)
+    return np.asarray(force - momentum * (float(force @ system.rotation) / inertia))
 
 
 def _held(system: Equations, force: Array) -> tuple[Array, Array]:
@@ -81,14 +96,14 @@ def _held(system: Equations, force: Array) -> tuple[Array, Array]:
     What dampers alone hold, as the ring of a damper, stands still on next to no spring.
     """
     stiffness = system.governed_stiffness + STILL * np.diag(system.mass)
-    if not is_free(system):
+    if not _is_free(system):
         return stiffness, force
     momentum = system.mass * system.rotation
     # of the size of the springs, or any where meshes are all that is elastic
-    size = float(np.abs(stiffness).max()) or 1.0
+    size = float(np.abs(system.governed_stiffness).max()) or 1.0
     share = momentum / np.abs(momentum).max()
     held = stiffness + size * np.outer(share, share)
-    return held, balanced(system, force)
+    return held, _balanced(system, force)
 
 
 def _static(

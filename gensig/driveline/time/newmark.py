@@ -24,6 +24,7 @@ from gensig.driveline.time.line_arrays import (
     pack_torques,
 )
 from gensig.driveline.time.line_dynamics import LineDynamics
+from gensig.driveline.time.line_statics import OUT_OF_BOUNDS
 from gensig.dynamics.backends.base import N_SEEN
 from gensig.dynamics.decimation import decimator
 from gensig.dynamics.equations import Equations
@@ -33,7 +34,6 @@ Array = NDArray[np.float64]
 
 KINDS = ("angle", "speed", "acceleration", "mesh_force")
 BLOCK = 512  # output samples that are integrated between two passes of the low-pass
-OUT_OF_BOUNDS = 1e6  # m, rad, m/s or rad/s
 LONGEST_STEP = 0.25  # pitches that a mesh may roll in a step
 
 

@@ -47,6 +47,7 @@ LIGHT = {
         ({"springs": (Spring(0, 1, -1.0, 0.0),)}, "spring of 'a' would feed energy in"),
         ({"springs": (Spring(1, HOUSING, 1.0, -1.0),)}, "'b' .* damping -1"),
         ({"springs": (Spring(1, 0, np.nan, 0.0),)}, "stiffness nan"),
+        ({"springs": (Spring(1, 0, 1.0, np.nan),)}, "damping nan"),
     ],
 )
 def test_impossible_bodies_are_refused(changes, text):
