@@ -28,7 +28,7 @@ from gensig.execution.local import LocalExecutor
 from gensig.mesh.load_distribution import sound_load
 from gensig.production.folder import begin_folder, run_folder
 from gensig.record import simulate as records
-from gensig.systems import spur_pair
+from gensig.systems import pair_machine
 
 # of the kernel's rate, where that would be the same
 RECORDING_SHARE = "share of the records' own integration"
@@ -79,7 +79,7 @@ def by_stage(
     for _ in range(runs):
         # what would not be there for records that have not been made before
         records.forget_twins()
-        spur_pair._mesh_table.cache_clear()
+        pair_machine._mesh_table.cache_clear()
         sound_load.cache_clear()
         with tempfile.TemporaryDirectory() as folder:
             n_records = begin_folder(config, [], Path(folder) / "set").n_records

@@ -24,8 +24,8 @@ from gensig.mesh.fillet_foundation import (
     fillet_foundation_compliance,
 )
 from gensig.plan.request import read_request
+from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.registry import read_system
-from gensig.systems.spur_pair import SpurPair
 
 Array = NDArray[np.float64]
 Height = Callable[[Gear, Array], Array]
@@ -51,7 +51,7 @@ TERMS = ("bending", "shear", "axial", "foundation")
 ROOT_ANGLES = ("root_half_angle", "root_curve_half_angle")
 
 
-def machine(pair: str, overrides: Sequence[str] = ()) -> SpurPair:
+def machine(pair: str, overrides: Sequence[str] = ()) -> GearPairMachine:
     """One of the compared pairs under the given conventions."""
     return read_system(read_request([*PAIRS[pair], *overrides]).config)
 
@@ -83,7 +83,7 @@ def phases() -> list[tuple[str, float]]:
     ]
 
 
-def job(system: SpurPair) -> dict[str, Any]:
+def job(system: GearPairMachine) -> dict[str, Any]:
     """Values of a pair that ``_ross_values`` needs, SI."""
     pair, material = system.pair, system.material
 
@@ -129,7 +129,7 @@ def _gear_job(gear: Gear) -> dict[str, Any]:
     }
 
 
-def gensig_values(system: SpurPair) -> Values:
+def gensig_values(system: GearPairMachine) -> Values:
     """gensig's value of everything that ROSS computes, under the system's conventions."""
     pair, options = system.pair, system.mesh
     points, shares = (
@@ -170,7 +170,7 @@ def gensig_values(system: SpurPair) -> Values:
     return values
 
 
-def ross_choices(system: SpurPair) -> Values:
+def ross_choices(system: GearPairMachine) -> Values:
     """The paper's terms of gensig with nothing but ROSS's choices put in, to show that these
     explain the difference.
     """
@@ -218,7 +218,12 @@ def ross_choices(system: SpurPair) -> Values:
 
 
 def foundation(
-    gear: Gear, curvature: Array, system: SpurPair, *, half_angle: float, height: Height
+    gear: Gear,
+    curvature: Array,
+    system: GearPairMachine,
+    *,
+    half_angle: float,
+    height: Height,
 ) -> Array:
     """gensig's body term of the paper with the two choices that differ between the programs put
     in, (phase,) m/N.
@@ -282,7 +287,7 @@ def ross_path(pair: GearPair, share: Array) -> tuple[Array, Array]:
     )
 
 
-def ross_pair_stiffness(system: SpurPair, pinion: Array, wheel: Array) -> Array:
+def ross_pair_stiffness(system: GearPairMachine, pinion: Array, wheel: Array) -> Array:
     """Single-pair stiffness from gensig's terms with ROSS's body choices, (phase,) N/m."""
     material = system.material
     contact = (

@@ -26,7 +26,7 @@ from gensig.production import folder as generation
 from gensig.production import shard_writing
 from gensig.record import simulate as records
 from gensig.record.inputs import InputReader
-from gensig.systems import pair_machine, spur_pair
+from gensig.systems import pair_machine
 
 PLAN, TABLES, EQUATIONS = "machine and plan row", "mesh tables", "equations and packing"
 SETTLING, RECORDING, CHECKING = (
@@ -48,7 +48,7 @@ STAGES = (PLAN, TABLES, EQUATIONS, *INTEGRATION, LOW_PASS, NOISE, WRITING, OTHER
 CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (shard_writing, "_folder_inputs", PLAN),
     (InputReader, "inputs", PLAN),
-    (spur_pair, "_mesh_table", TABLES),
+    (pair_machine, "_mesh_table", TABLES),
     (pair_machine, "pair_dynamics", EQUATIONS),
     (pair_machine, "check_machine", EQUATIONS),
     (group_motions, "settling_time", EQUATIONS),

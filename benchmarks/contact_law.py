@@ -34,10 +34,9 @@ from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.pair_table import flank_sides, pair_table
 from gensig.mesh.tooth_table import ToothTable
 from gensig.plan.request import read_request
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import GearPairMachine, pair_dynamics
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run
-from gensig.systems.spur_pair import SpurPair
 
 Array = NDArray[np.float64]
 
@@ -63,14 +62,14 @@ class Case:
 
     torque: float
     fault: str
-    system: SpurPair
+    system: GearPairMachine
     faults: tuple[Fault, ...]
 
     @property
     def dynamics(self) -> PairDynamics:
         """Perfect gears, tooth 0 of either entering at A at time 0.
 
-        What ``SpurPair.simulate`` takes unasked.
+        What ``GearPairMachine.simulate`` takes unasked.
         """
         return pair_dynamics(Run(system=self.system, faults=self.faults))
 

@@ -29,7 +29,7 @@ from gensig.mesh.load_distribution import sound_load
 from gensig.plan.request import read_request
 from gensig.production.folder import begin_folder, run_folder
 from gensig.production.shard_writing import write_shard
-from gensig.systems import spur_pair
+from gensig.systems import pair_machine
 from gensig.systems.base import simulate_together
 from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.registry import read_system
@@ -235,7 +235,7 @@ def against_teeth(runs: int, sizes: Sizes) -> tuple[dict[str, float], dict[str, 
     tables, motions = {}, {}
 
     def table(run: Run) -> None:
-        spur_pair._mesh_table.cache_clear()
+        pair_machine._mesh_table.cache_clear()
         sound_load.cache_clear()
         pair_dynamics(run)
 

@@ -17,8 +17,8 @@ from gensig.dynamics.pair import PairDynamics
 from gensig.geometry.gear import Gear
 from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
+from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.registry import read_system
-from gensig.systems.spur_pair import SpurPair
 
 # An example that takes long on a busy machine is no failure.
 settings.register_profile("untimed", deadline=None)
@@ -75,18 +75,18 @@ def config_with(composed_config) -> Callable[..., Configuration]:
 
 
 @pytest.fixture(scope="session")
-def machine(config_with) -> Callable[..., SpurPair]:
+def machine(config_with) -> Callable[..., GearPairMachine]:
     """The xiamen pair with dotted keys replaced."""
     return lambda changes=None: read_system(config_with(changes))
 
 
 @pytest.fixture(scope="session")
-def xiamen(machine) -> SpurPair:
+def xiamen(machine) -> GearPairMachine:
     return machine()
 
 
 @pytest.fixture(scope="session")
-def paper_machine(machine) -> SpurPair:
+def paper_machine(machine) -> GearPairMachine:
     """Every convention of the spur paper."""
     return machine(
         {"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"}
@@ -108,7 +108,9 @@ def gear_with(xiamen) -> Callable[..., Gear]:
 def dynamics_of() -> Callable[..., PairDynamics]:
     """Equations of motion of a machine with perfect teeth, or with the given tooth errors."""
 
-    def make(system: SpurPair, faults=(), *, phase=0.3, **errors: Any) -> PairDynamics:
+    def make(
+        system: GearPairMachine, faults=(), *, phase=0.3, **errors: Any
+    ) -> PairDynamics:
         counts = {
             "pinion": system.pair.pinion.n_teeth,
             "wheel": system.pair.wheel.n_teeth,

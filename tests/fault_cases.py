@@ -17,7 +17,7 @@ from gensig.faults.base import Fault, faulty_teeth
 from gensig.faults.registry import FAULTS, read_faults
 from gensig.mesh.pair_table import pair_table
 from gensig.mesh.tooth_table import ToothTable
-from gensig.systems.spur_pair import SpurPair
+from gensig.systems.pair_machine import GearPairMachine
 
 GEARS = ("pinion", "wheel")
 FULL = 20.0  # mm, face width of the xiamen pair
@@ -148,7 +148,7 @@ def one(kind: str, **changes: Any) -> Fault:
     return result
 
 
-def heavy_table(system: SpurPair, *faults: Fault) -> ToothTable:
+def heavy_table(system: GearPairMachine, *faults: Fault) -> ToothTable:
     """The table for pairs that carry the whole load alone, wherever they are."""
     teeth = faulty_teeth(system.pair, faults)
     return pair_table(
@@ -179,7 +179,7 @@ def side_of(table: ToothTable, gear: str) -> Side:
     )
 
 
-def deflection(system: SpurPair, *faults: Fault, tooth: int = 0) -> np.ndarray:
+def deflection(system: GearPairMachine, *faults: Fault, tooth: int = 0) -> np.ndarray:
     """Approach under which a pair carries the whole load alone: gap plus compliance times load, on
     the path, (node,) m.
 

@@ -9,8 +9,7 @@ from gensig.dynamics.response import accelerations
 from gensig.options.compose import compose
 from gensig.papers.paper_figure import Curve, Panel, Paper, PaperFigure
 from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
-from gensig.systems.helical_pair import HelicalPair
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import GearPairMachine, pair_dynamics
 from gensig.systems.registry import PairParts, helical_pair, read_sliced_pair
 from gensig.systems.run import Run
 from gensig.units import to_si
@@ -51,7 +50,7 @@ QUIETER = (
 )
 
 
-def run_up_level(system: HelicalPair) -> Array:
+def run_up_level(system: GearPairMachine) -> Array:
     """Mean square acceleration of the bearings at the mesh orders, (speed,) dB.
 
     The static transmission error at the mean load pushes the linear machine with the mesh's mean

@@ -1,15 +1,17 @@
-"""Machines with one gear pair: lateral and torsional motion, many records side by side."""
+"""A machine of one gear pair: lateral and torsional motion, many records side by side."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Self
+from functools import lru_cache
+from typing import Self, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.dynamics.backends.base import MOST_PAIRS
+from gensig.dynamics.helical import AXIAL_DOFS
 from gensig.dynamics.integrator import (
     check_channels,
     check_machine,
@@ -18,12 +20,24 @@ from gensig.dynamics.integrator import (
 )
 from gensig.dynamics.mesh_state import mesh_state
 from gensig.dynamics.mesh_teeth import MeshTeeth
-from gensig.dynamics.pair import Body, PairDynamics, Rotor
+from gensig.dynamics.pair import PAIR_DOFS, Body, PairDynamics, Rotor
 from gensig.dynamics.response import LinearPair
-from gensig.errors import FaultError, SimulationError
+from gensig.errors import ConfigError, FaultError, GeometryError, SimulationError
 from gensig.faults.base import Fault, faulty_teeth, require_gears
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
+from gensig.material import Material
+from gensig.mesh.load_distribution import loaded_pair_table
+from gensig.mesh.modification import (
+    PLAIN,
+    FlankModification,
+    PairModification,
+    sound_teeth,
+)
+from gensig.mesh.options import MeshOptions, SliceOptions
+from gensig.mesh.pair_table import N_PAIRS
+from gensig.mesh.thermal.paper_growth import PaperGrowth
+from gensig.mesh.tooth_table import ToothTable
 from gensig.sensing.encoder import Disc
 from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
 from gensig.systems.base import Machine, MachineMesh, simulate_together, specimen_table
@@ -34,6 +48,12 @@ from gensig.systems.integration_checks import (
     records_by_kind,
 )
 from gensig.systems.run import CleanRecord, Run, Start, angle_from_tooth_0
+from gensig.systems.sliced_pair import SlicedPair
+from gensig.systems.stiffness_curves import (
+    StiffnessCurves,
+    single_pair,
+    stiffness_curves,
+)
 from gensig.systems.supports import in_gearbox
 
 Array = NDArray[np.float64]
@@ -53,24 +73,150 @@ __all__ = [
 ]
 
 
+@final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearPairMachine(Machine):
-    """One gear pair with its supports, drive, motor and load; subclasses define the mesh."""
+    """One gear pair with its supports, drive, motor and load.
+
+    Parameters
+    ----------
+    slices : of the flanks at rest, and of the teeth of records unless they are whole
+    has_whole_teeth : False for teeth in slices, whose gears also move along their axes and tilt
+    modification : of all teeth, before errors and faults
+    hot_teeth : growth of teeth by ``mesh.heat_law=paper``
+    """
 
     pair: GearPair = field()
     pinion: Body
     wheel: Body
+    slices: SliceOptions
+    has_whole_teeth: bool = field()
+    modification: PairModification = PLAIN
+    hot_teeth: PaperGrowth | None = None
     motor: Rotor | None = None
     load: Rotor | None = None
 
     @property
-    @abstractmethod
-    def gear_channels(self) -> tuple[str, ...]:
-        """Channels of the two gears: all of their motions."""
+    def flanks(self) -> SlicedPair:
+        """As ``Machine.flanks``: transmission error, load over the flanks and stiffness."""
+        return SlicedPair(
+            pair=self.pair,
+            material=self.material,
+            mesh=self.mesh,
+            slices=self.slices,
+            modification=replace(self.modification, growth=None),
+            torque=self.operating.torque,
+            growth=self.modification.growth,
+            hot_teeth=self.hot_teeth,
+        )
 
-    @abstractmethod
+    @property
+    def gear_channels(self) -> tuple[str, ...]:
+        """Motions of both gears across and along the line of action, and rotations.
+
+        Gears whose teeth are in slices also have those along their axes, and tilts.
+        """
+        if self.has_whole_teeth:
+            return PAIR_DOFS
+        return (*PAIR_DOFS, *AXIAL_DOFS)
+
+    @property
+    def most_pairs(self) -> int:
+        """Pairs of teeth that are followed at once."""
+        if self.has_whole_teeth:
+            return N_PAIRS
+        return MOST_PAIRS
+
     def require_drive(self) -> None:
-        """Raise GeometryError unless at least one pair of teeth is always in contact."""
+        """Raise unless at least one pair of teeth is always in contact.
+
+        The overlap of the face counts for teeth in slices.
+        """
+        if self.has_whole_teeth:
+            self.pair.require_continuous_drive()
+            return
+        if self.slices.slices_in_phase:
+            raise ConfigError(
+                "mesh.slices_in_phase = true is for comparing statics; records have the helix in: "
+                "take false"
+            )
+        if self.pair.total_contact_ratio < 1.0:
+            raise GeometryError(
+                f"the total contact ratio {self.pair.total_contact_ratio:.4f} is below 1, so the "
+                "drive is interrupted at every tooth; use more teeth, a wider face, a larger helix "
+                "angle or a larger addendum_coefficient"
+            )
+
+    def mesh_table(self, faults: Sequence[Fault] = ()) -> ToothTable:
+        """As ``Machine.mesh_table``."""
+        if not self.has_whole_teeth:
+            return self.flanks.mesh_table(faults)
+        machine = self.pair, self.material, self.mesh
+        return _mesh_table(*machine, tuple(faults), self.mesh_force, self.modification)
+
+    def stiffness_curves(
+        self,
+        faults: Sequence[Fault] = (),
+        *,
+        n_positions: int = 201,
+        points_per_tooth: int = 100,
+    ) -> StiffnessCurves:
+        """As ``Machine.stiffness_curves``, with their parts.
+
+        Contact ratios below 1 are allowed.
+        """
+        if not self.has_whole_teeth:
+            raise ConfigError(
+                "stiffness_curves are those of system=spur_pair; a helical pair has its stiffness "
+                "slice by slice: flanks.transmission_error(), or gensig stiffness "
+                "system=helical_pair"
+            )
+        return stiffness_curves(
+            self,
+            self.mesh_table(faults),
+            faults,
+            sound_teeth(self.pair, self.modification),
+            n_positions=n_positions,
+            points_per_tooth=points_per_tooth,
+        )
+
+    def long_relief(self) -> PairModification:
+        """Linear tip reliefs that compensate the deflection of unmodified teeth at the set torque.
+
+        From the tips down to the begin of single-pair contact (point B of the wheel, D of the
+        pinion), as deep as the deflection of the pair there less the body's part, which the next
+        pair shares.
+
+        Raises
+        ------
+        ConfigError      for teeth in slices
+        GeometryError    for a contact ratio outside 1..2: without single-pair contact
+
+        Source: Welbourn's rule as in Lin, Oswald & Townsend (1989), see
+        ``docs/theory/spur_mesh.md``; the shared part is ours.
+        """
+        if not self.has_whole_teeth:
+            raise ConfigError(
+                "long_relief is for whole spur teeth: take system=spur_pair; a helical pair has "
+                "gensig modify-flank"
+            )
+        pair = self.pair
+        if not 1.0 <= pair.transverse_contact_ratio < 2.0:
+            raise GeometryError(
+                f"the transverse contact ratio {pair.transverse_contact_ratio:.4f} lies outside "
+                "1..2, where a pair carries alone for a while: that is where these reliefs begin"
+            )
+        alone = np.array([pair.base_pitch, pair.path_of_contact - pair.base_pitch])
+        plain = replace(self, modification=PLAIN)
+        shared = plain.mesh_table().shared_compliance
+        sound = single_pair(plain, alone, (), sound_teeth(pair, PLAIN))
+        depth = self.mesh_force * (1.0 / sound.stiffness - shared)
+        pinion_start = pair.pinion_curvature(alone[0])
+        wheel_start = pair.wheel_curvature(alone[1])
+        return PairModification(
+            pinion=_tip_relief(pair.pinion, depth[0], pinion_start),
+            wheel=_tip_relief(pair.wheel, depth[1], wheel_start),
+        )
 
     @property
     def gears(self) -> dict[str, Gear]:
@@ -188,6 +334,30 @@ class GearPairMachine(Machine):
         return simulate_pairs(runs)
 
 
+def _tip_relief(
+    gear: Gear, depth: float, curvature: Array | float
+) -> FlankModification:
+    """Tip relief from a curvature radius in m up."""
+    start_radius = float(np.hypot(gear.base_radius, curvature))
+    height = gear.tip_radius - start_radius
+    return FlankModification(tip_relief=float(depth), tip_relief_height=height)
+
+
+@lru_cache(maxsize=32)
+def _mesh_table(
+    pair: GearPair,
+    material: Material,
+    mesh: MeshOptions,
+    faults: tuple[Fault, ...],
+    force: float,
+    modification: PairModification,
+) -> ToothTable:
+    teeth = faulty_teeth(pair, faults, sound_teeth(pair, modification))
+    return loaded_pair_table(
+        pair, material, mesh, teeth, force=force, modification=modification
+    )
+
+
 PairRun = Run[GearPairMachine]
 
 
@@ -235,7 +405,7 @@ def _kind(run: PairRun, _: PairDynamics) -> tuple[object, ...]:
         system.sensing.sampling_rate,
         system.sensing.channels,
         system.operating.duration,
-        type(system),
+        system.has_whole_teeth,
         system.motor is None,
         system.load is None,
         system.operating.is_steady,

@@ -27,11 +27,9 @@ from gensig.options.configuration import Configuration, Section
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.options import read_sensing
 from gensig.systems.derived_sizes import completed, least_backlash
-from gensig.systems.helical_pair import HelicalPair
 from gensig.systems.hot_pair import Duty, as_configured
 from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.sliced_pair import SlicedPair
-from gensig.systems.spur_pair import SpurPair
 from gensig.systems.supports import (
     AS_GIVEN,
     DAMPING_RATIO,
@@ -145,7 +143,7 @@ class PairParts:
         )
 
 
-def spur_pair(parts: PairParts) -> SpurPair:
+def spur_pair(parts: PairParts) -> GearPairMachine:
     """A spur pair."""
     modification = parts.modification
     refuse_papers_heat(parts.mesh, "system=spur_pair")
@@ -173,12 +171,16 @@ def spur_pair(parts: PairParts) -> SpurPair:
         modification = replace(modification, growth=flanks.growth)
         machine["material"] = flanks.material
     sound_teeth(pair, modification)  # raises for reliefs that overlap
-    return SpurPair(
-        pair=pair, slices=parts.slices, modification=modification, **machine
+    return GearPairMachine(
+        pair=pair,
+        slices=parts.slices,
+        has_whole_teeth=True,
+        modification=modification,
+        **machine,
     )
 
 
-def helical_pair(parts: PairParts) -> HelicalPair:
+def helical_pair(parts: PairParts) -> GearPairMachine:
     """A helical pair, or a spur pair in slices."""
     flanks = parts.flanks
     machine = _common_parts(parts, flanks.pair)
@@ -186,7 +188,16 @@ def helical_pair(parts: PairParts) -> HelicalPair:
         name: held_axially(machine[name], gear, parts.gear.section(name))
         for name, gear in flanks.pair.gears.items()
     }
-    return HelicalPair(pair=flanks.pair, flanks=flanks, **{**machine, **bodies})
+    machine |= bodies
+    machine["material"] = flanks.material
+    return GearPairMachine(
+        pair=flanks.pair,
+        slices=flanks.slices,
+        has_whole_teeth=False,
+        modification=replace(flanks.modification, growth=flanks.growth),
+        hot_teeth=flanks.hot_teeth,
+        **machine,
+    )
 
 
 def _common_parts(parts: PairParts, pair: GearPair) -> dict[str, Any]:

@@ -174,10 +174,7 @@ def test_leads_are_those_of_the_sliced_pair(config_with, lead, share):
     config = config_with()
     spur = relieved(read_system(config), **lead)
     sliced = read_system(config.with_keys("system", kind="helical_pair"))
-    sliced = replace(
-        sliced,
-        flanks=replace(sliced.flanks, modification=spur.modification),
-    )
+    sliced = replace(sliced, modification=spur.modification)
     roll = spur.pair.base_pitch * (np.arange(64) + 0.5) / 64
     table = spur.mesh_table()
     slices = sliced.mesh_table()

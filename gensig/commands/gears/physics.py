@@ -15,8 +15,8 @@ from gensig.commands.request import read_configuration
 from gensig.faults.registry import read_faults
 from gensig.record.machines import read_machine
 from gensig.systems.base import Machine
+from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.registry import SLICED, PairParts
-from gensig.systems.spur_pair import SpurPair
 from gensig.systems.stiffness_curves import StiffnessCurves
 from gensig.terminal.printing import show
 
@@ -70,7 +70,8 @@ def stiffness_content(system: Machine, curves: StiffnessCurves) -> dict[str, Any
         "compliance_m_per_n": curves.compliance,
         "shared_body_compliance_m_per_n": table.shared_compliance,
     }
-    if isinstance(system, SpurPair) and not is_paper and 1.0 <= ratio < 2.0:
+    has_relief = not is_paper and 1.0 <= ratio < 2.0
+    if isinstance(system, GearPairMachine) and has_relief:
         relief = system.long_relief()
         content["long_tip_relief"] = {
             name: {

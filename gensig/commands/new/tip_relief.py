@@ -5,7 +5,7 @@ from __future__ import annotations
 from gensig.commands.new.data_sheet import GearOption
 from gensig.errors import GeometryError
 from gensig.geometry.contact import SIDES
-from gensig.systems.spur_pair import SpurPair
+from gensig.systems.pair_machine import GearPairMachine
 from gensig.text.option_writing import option_lines
 
 RELIEF_ORIGIN = (
@@ -19,7 +19,7 @@ def tip_reliefs(option: GearOption) -> dict[str, dict[str, float]]:
     Empty for helical gears, and for contact ratios outside 1 to 2.
     """
     machine = option.machine
-    if not isinstance(machine, SpurPair):
+    if not isinstance(machine, GearPairMachine) or not machine.has_whole_teeth:
         return {}
     try:
         relief = machine.long_relief()

@@ -22,8 +22,8 @@ from gensig.mesh.pair_table import pair_table
 from gensig.mesh.tooth_table import ToothTable
 from gensig.options.compose import compose
 from gensig.options.configuration import Configuration
+from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.registry import read_system
-from gensig.systems.spur_pair import SpurPair
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class Case:
     """One machine with its faults; the same overrides always give the same object."""
 
     overrides: tuple[str, ...]
-    system: SpurPair
+    system: GearPairMachine
     faults: tuple[Fault, ...]
 
     @property
@@ -114,7 +114,7 @@ def read_case(overrides: tuple[str, ...]) -> Case:
 
 # composing takes longer than all that a row computes: values are typed into one composed machine
 @lru_cache(maxsize=128)
-def _read_machine(overrides: tuple[str, ...]) -> SpurPair:
+def _read_machine(overrides: tuple[str, ...]) -> GearPairMachine:
     keys = [word.partition("=")[0] for word in overrides]
     if not all("." in key and not key.startswith("gear.rated_") for key in keys):
         return read_system(

@@ -14,8 +14,8 @@ from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.modification import FlankModification
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
+from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.sliced_pair import SlicedPair
-from gensig.systems.spur_pair import SpurPair
 
 TABLES = Path(configs.__file__).parent / "tables"
 SHORT = ("operating.duration_s=0.02", "mesh.points_per_pitch=64", "mesh.n_slices=6")
@@ -58,7 +58,7 @@ def test_spur_teeth_are_those_of_a_pair():
             torque=machine.mesh_force * machine.pair.pinion.base_radius,
         ),
     )
-    assert isinstance(pair, SpurPair)
+    assert isinstance(pair, GearPairMachine)
     assert_same_tables(machine.mesh_table(), pair.mesh_table())
 
 

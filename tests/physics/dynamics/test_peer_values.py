@@ -23,7 +23,7 @@ from gensig.mesh.fillet_foundation import (
     body_coefficients,
     fillet_foundation_compliance,
 )
-from gensig.systems.spur_pair import SpurPair
+from gensig.systems.pair_machine import GearPairMachine
 
 ROOT = Path(__file__).resolve().parents[3]
 PAPER = {
@@ -54,7 +54,7 @@ EACH_SIDE = pytest.mark.parametrize("side", ["pinion", "wheel"])
 class Peer:
     """One pair: gensig's machine under the paper's conventions, and ROSS's values."""
 
-    system: SpurPair
+    system: GearPairMachine
     rows: tuple[dict[str, str], ...]
 
     def ross(self, quantity, column="value"):

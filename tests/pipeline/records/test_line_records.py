@@ -18,7 +18,7 @@ from gensig.errors import GensigError
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
-from gensig.systems.spur_pair import SpurPair
+from gensig.systems.pair_machine import GearPairMachine
 
 MOTOR = ("system=two_stage_gearbox", "excitation=motor_and_load")
 TRAIN = ("system=engine_gear_train", "excitation=engine_v20")
@@ -124,8 +124,9 @@ def test_stiffness_is_that_of_the_record_mesh(tmp_path):
     content = json.loads(out.read_text())
     # the same teeth as a pair, under what the first stage makes of the torque
     line = read_machine(read_request(list(words)).config)
-    alone = SpurPair(
+    alone = GearPairMachine(
         slices=line.slices,
+        has_whole_teeth=True,
         pair=line.pair,
         material=line.material,
         mesh=line.mesh,

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from numba import njit
 from numba.core.errors import NumbaError
 
 from gensig.dynamics._vector import (
@@ -148,7 +149,7 @@ def test_loops_and_branches_of_the_compiled_code(flag) -> None:
 def test_traced_functions_are_run_once() -> None:
     bodies.clear()
 
-    @compiled
+    @njit  # without a cache, from which a second run of the tests would read it
     def calling(rows, n, flag):
         branches(rows, n, spread(rows, flag))
 

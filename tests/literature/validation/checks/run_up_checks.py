@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gensig.options.compose import compose
 from gensig.papers.error_paper import SPEEDS_RPM, run_up_level
-from gensig.systems.helical_pair import HelicalPair
+from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.registry import read_system
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ VARIANTS = ("beihang_least_ripple", "beihang_even_load", "beihang_both")
 class RunUpCase:
     """One machine with one modification, and the overrides that make it."""
 
-    system: HelicalPair
+    system: GearPairMachine
     overrides: tuple[str, ...]
 
     @cached_property
