@@ -25,6 +25,7 @@ from gensig.systems.pair_machine import (
     PairMachine,
     pair_dynamics,
 )
+from gensig.systems.registry import read_sliced_pair
 from gensig.systems.run import CHECKS, Run, Start
 from gensig.units import SPEED
 
@@ -150,6 +151,29 @@ def test_the_declared_channels_are_those_that_check_takes(any_machine):
     for name in others:
         with refused(f"sensing.channels: no channel {name}"):
             check(name)
+
+
+@pytest.mark.parametrize("name", ["spur_pair", "helical_pair"])
+def test_flanks_at_rest_are_those_of_the_changed_pair(name):
+    machine = read(name)
+    changed = replace(
+        machine,
+        operating=replace(machine.operating, torque=31.0),
+        material=replace(machine.material, youngs_modulus=1.9e11),
+        modification=replace(machine.modification, misalignment=5e-6),
+    )
+    at_rest = changed.flanks
+    assert at_rest.torque == 31.0
+    assert at_rest.material == changed.material
+    assert at_rest.modification == changed.modification
+
+
+def test_softened_teeth_are_of_the_hot_material():
+    words = ["system=helical_pair", "heat=chongqing_rated", "heat.softening=true"]
+    config = read_request(words).config
+    hot = read_machine(config)
+    assert hot.flanks == read_sliced_pair(config)
+    assert hot.material.youngs_modulus < read("helical_pair").material.youngs_modulus
 
 
 @pytest.mark.parametrize("name", ["spur_pair", "helical_pair"])
