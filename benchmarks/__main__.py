@@ -47,7 +47,8 @@ GOALS = {
 
 def kernels(runs: int, precisions: Sequence[str] = PRECISIONS) -> dict[str, float]:
     """Rates of the integrators alone."""
-    lanes = _rates.machines()
+    pairs = _rates.machines()
+    lanes = [pair.dynamics for pair in pairs]
     eight = lanes[:LANES]
     works = {
         f"compiled core float64 x{oversampling}": _rates.kernel(eight, oversampling)
@@ -63,8 +64,8 @@ def kernels(runs: int, precisions: Sequence[str] = PRECISIONS) -> dict[str, floa
     for precision in precisions:
         machines = boxes[: n_lanes(precision)]
         works[TWO_STAGE.format(precision)] = _rates.kernel(machines, 5, precision, core)
-    works[SCALAR] = _rates.scalar(eight, 5)
-    works |= _rates.scipy_works(eight[0])
+    works[SCALAR] = _rates.scalar(pairs[:LANES], 5)
+    works |= _rates.scipy_works(pairs[0])
     result = _rates.rates(
         works, 4 * runs
     )  # they are short: many turns cost little, and one of them is undisturbed

@@ -53,7 +53,7 @@ from gensig.dynamics.backends.nystroem._meshes import (
 )
 from gensig.dynamics.backends.nystroem._slots import near_pairs, write_mesh
 from gensig.dynamics.backends.nystroem.machine_lanes import pack
-from gensig.dynamics.equations import Dynamics
+from gensig.dynamics.motion.dynamics import Dynamics
 
 UNLIMITED = 1e30  # N s/m: no damper of a pair is limited
 ROUNDS = 20  # in which chords and the deflection they share converge

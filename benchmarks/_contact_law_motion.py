@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from benchmarks._mesh_numbers import MeshNumbers
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.pair import RunningPair
 from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS
 from gensig.mesh.tooth_table import ToothTable
 
@@ -289,7 +289,7 @@ def _integrate(
 def motion(
     mesh: Mesh,
     numbers: MeshNumbers,
-    dynamics: PairDynamics,
+    running: RunningPair,
     start: Array,
     *,
     step: float,
@@ -304,17 +304,17 @@ def motion(
     """
     velocity = np.empty(n_steps + 1)
     state = np.concatenate([start, np.zeros_like(start)])
-    system = dynamics.equations
+    system = running.equations
     spring = np.diag(system.governed_stiffness).copy()
     damper = np.diag(system.governed_damping).copy()
     lowest = _integrate(
         mesh,
         numbers,
-        dynamics.approach_direction(),
+        running.approach_direction(),
         system.mass,
         spring,
         damper,
-        dynamics.set_force,
+        running.dynamics.forces(np.zeros(1))[0],
         state,
         step,
         first_step,

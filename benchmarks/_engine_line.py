@@ -15,8 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks._phase_mesh import phase_table, plain_pair
-from gensig.driveline.time.course import ShaftTorque, constant_speed
-from gensig.driveline.time.line_dynamics import LineDynamics
 from gensig.dynamics.equations import (
     A_TURN,
     A_X,
@@ -30,6 +28,8 @@ from gensig.dynamics.equations import (
     Mesh,
 )
 from gensig.dynamics.mesh_teeth import MeshTeeth
+from gensig.dynamics.motion.course import ShaftTorque, constant_speed
+from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.geometry.contact import GearPair
 
 Array = NDArray[np.float64]
@@ -137,7 +137,7 @@ def engine_line(
     linear: bool = False,
     torques: Sequence[ShaftTorque] = (),
     speed: float = 0.0,
-) -> LineDynamics:
+) -> Dynamics:
     """The whole line, rigid compounds merged: 65 rotations, and 44 lateral motions of 11 gears on
     their bearings.
 
@@ -188,13 +188,15 @@ def engine_line(
             touched[[A_X, A_Y]] = side_of[driver], side_of[driver] + 1
             touched[[B_X, B_Y]] = side_of[driven], side_of[driven] + 1
             reach[[A_X, A_Y]], reach[[B_X, B_Y]] = along, np.negative(along)
+        teeth = _teeth(pair, value * 1e6 / (radii[0] * radii[1]), linear)
         meshes.append(
             Mesh(
                 name=f"{driver}-{driven}",
-                teeth=_teeth(pair, value * 1e6 / (radii[0] * radii[1]), linear),
+                teeth=teeth,
                 touched=touched,
                 reach=reach,
                 slide=np.zeros(N_IN_PLANE),
+                stiffness=teeth.mean_stiffness(1.0),
                 damping=MESH_DAMPING * (not linear),
                 mean_force=1.0,
                 speed=abs(rotation[a]) * speed,
@@ -215,8 +217,8 @@ def engine_line(
         reference=0,
         angles=(),
     )
-    return LineDynamics(
-        names=tuple(names),
+    return Dynamics(
+        dofs=tuple(names),
         system=system,
         nominal=constant_speed(speed),
         torques=tuple(torques),

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.pair import RunningPair
 
 
 class MeshNumbers(NamedTuple):
@@ -33,20 +33,20 @@ class MeshNumbers(NamedTuple):
     consistent: bool
 
 
-def mesh_numbers(dynamics: PairDynamics) -> MeshNumbers:
+def mesh_numbers(running: RunningPair) -> MeshNumbers:
     """The numbers of one machine that runs at constant speed.
 
     Raises
     ------
     ValueError    for a law other than the one-sided one
     """
-    table, pair, options = dynamics.table, dynamics.table.pair, dynamics.table.options
+    table, pair, options = running.table, running.table.pair, running.table.options
     if options.law != "one_sided":
         raise ValueError(f"mesh.law={options.law}; only one_sided is written out here")
     viscous = (
         2.0
         * options.damping_ratio
-        * math.sqrt(dynamics.mean_mesh_stiffness * dynamics.equivalent_mass)
+        * math.sqrt(running.mean_mesh_stiffness * running.equivalent_mass)
     )
     return MeshNumbers(
         pinion_radius=pair.pinion.base_radius,
@@ -58,13 +58,13 @@ def mesh_numbers(dynamics: PairDynamics) -> MeshNumbers:
         start_curvature=pair.start_curvature_radius,
         tangent_length=pair.tangent_length,
         shared=table.shared_compliance,
-        damping=viscous / dynamics.mesh_force,
+        damping=viscous / running.mesh_force,
         friction=options.friction_coefficient,
         friction_half_width=0.5 * options.friction_transition * pair.base_pitch,
         backlash=pair.backlash,
-        start_roll=dynamics.teeth.start_roll,
-        speed=dynamics.operating.speed,
-        start_pinion=dynamics.teeth.start_teeth[0],
-        start_wheel=dynamics.teeth.start_teeth[1],
+        start_roll=running.teeth.start_roll,
+        speed=running.operating.speed,
+        start_pinion=running.teeth.start_teeth[0],
+        start_wheel=running.teeth.start_teeth[1],
         consistent=options.roll_torque == "consistent",
     )

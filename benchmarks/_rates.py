@@ -15,21 +15,20 @@ from scipy.integrate import solve_ivp
 from benchmarks import _classical_scheme, _scalar
 from benchmarks._measure import in_turn
 from gensig.driveline.side_by_side.line_records import running_line_of
-from gensig.driveline.time.line_dynamics import LineDynamics
 from gensig.dynamics._layout import N_LAW
 from gensig.dynamics._vector import LANES, n_lanes
 from gensig.dynamics.backends.group_run import Core, GroupRun
 from gensig.dynamics.backends.nystroem.machine_lanes import pack
 from gensig.dynamics.backends.nystroem.method import THREE_PAIRS
 from gensig.dynamics.decimation import decimator, in_band_error
-from gensig.dynamics.equations import Dynamics
 from gensig.dynamics.lanes import fill_lanes
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.motion.dynamics import Dynamics
+from gensig.dynamics.pair import RunningPair
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.inputs import InputReader
 from gensig.record.machines import read_machine
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import running_pair
 from gensig.systems.run import Run, Start
 
 Array = NDArray[np.float64]
@@ -64,14 +63,14 @@ def quickstart(
     return config, [plan.record(place) for place in range(n_records)]
 
 
-def machines(*words: str, n: int = n_lanes("float32")) -> list[PairDynamics]:
+def machines(*words: str, n: int = n_lanes("float32")) -> list[RunningPair]:
     """The machines of as many quickstart records."""
     config, rows = quickstart(n, *words)
     reader = InputReader(config)
-    return [pair_dynamics(reader.inputs(row).run) for row in rows]
+    return [running_pair(reader.inputs(row).run) for row in rows]
 
 
-def two_stage_boxes(n: int = n_lanes("float32")) -> list[LineDynamics]:
+def two_stage_boxes(n: int = n_lanes("float32")) -> list[Dynamics]:
     """Two-stage gearboxes of ``experiment=two_stage`` that begin at other teeth each."""
     config = read_request(["experiment=two_stage"]).config
     machine = read_machine(config)
@@ -137,15 +136,15 @@ def kernel(
 
 
 def scalar_run(
-    dynamics: PairDynamics, oversampling: int, seconds: float
+    running: RunningPair, oversampling: int, seconds: float
 ) -> tuple[Array, Array]:
     """State (2, dof) and mean accelerations (step, channel) of the scalar code, from rest at time
     0.
     """
     step = 1.0 / (SAMPLING_RATE * oversampling)
-    state = np.array([dynamics.static_start(0.0), np.zeros(len(dynamics.dofs))])
+    state = np.array([running.dynamics.static_start(0.0), np.zeros(len(running.dofs))])
     means = np.empty((round(seconds / step), len(CHANNELS)))
-    machine = _scalar.machine(dynamics)
+    machine = _scalar.machine(running)
     lowest = _scalar.integrate(machine, state, step, 0, len(means), CHANNELS, means)
     if lowest < -machine.mesh.backlash:
         raise ValueError(
@@ -155,7 +154,7 @@ def scalar_run(
     return state, means
 
 
-def scalar(all_of: list[PairDynamics], oversampling: int) -> Work:
+def scalar(all_of: list[RunningPair], oversampling: int) -> Work:
     """Scalar Numba, one settled record after the other, with the same four channels."""
     step = 1.0 / (SAMPLING_RATE * oversampling)
     means, first = (
@@ -176,15 +175,16 @@ def scalar(all_of: list[PairDynamics], oversampling: int) -> Work:
     return work, len(all_of) * len(means) * step
 
 
-def difference(all_of: list[PairDynamics], oversampling: int) -> float:
+def difference(all_of: list[RunningPair], oversampling: int) -> float:
     """Largest relative difference of both codes' accelerations, 20 Hz to 20 kHz, over 20 ms from
     the same start.
     """
     step, low_pass = 1.0 / (SAMPLING_RATE * oversampling), decimator(oversampling)
     n_steps = (round(SETTLING * SAMPLING_RATE) + 2 * low_pass.margin) * oversampling + 1
-    group = THREE_PAIRS.pack(all_of, step, "float64", (0.0, 0.0))
-    run = GroupRun(all_of, CHANNELS, "float64", THREE_PAIRS)
-    for lane, dynamics in enumerate(all_of):
+    lanes = [one.dynamics for one in all_of]
+    group = THREE_PAIRS.pack(lanes, step, "float64", (0.0, 0.0))
+    run = GroupRun(lanes, CHANNELS, "float64", THREE_PAIRS)
+    for lane, dynamics in enumerate(lanes):
         run.begin(group, lane, *dynamics.start(0.0))
     ours = np.empty((n_steps, len(CHANNELS), LANES))
     THREE_PAIRS.integrate(
@@ -214,7 +214,7 @@ def difference(all_of: list[PairDynamics], oversampling: int) -> float:
     )
 
 
-def check_same_law(all_of: list[PairDynamics]) -> float:
+def check_same_law(all_of: list[RunningPair]) -> float:
     """The difference at a step fine enough for either, refused where it is none of the step's."""
     result = difference(all_of, SAME_OVERSAMPLING)
     if not result < SAME:
@@ -224,17 +224,17 @@ def check_same_law(all_of: list[PairDynamics]) -> float:
     return result
 
 
-def scipy_works(dynamics: PairDynamics) -> dict[str, Work]:
+def scipy_works(running: RunningPair) -> dict[str, Work]:
     """``solve_ivp`` at rtol 1e-6 from a settled state on, by method.
 
     The right-hand side is the scalar code, compiled whole with the machine in it; once more it
     is NumPy around the
     product's own compiled law, as one would write it without.
     """
-    settled = scalar_run(dynamics, SAME_OVERSAMPLING, SETTLING)[0].ravel()
+    settled = scalar_run(running, SAME_OVERSAMPLING, SETTLING)[0].ravel()
     compiled, plain = (
-        _scalar.right_hand_side(_scalar.machine(dynamics)),
-        _numpy_right_hand_side(dynamics),
+        _scalar.right_hand_side(_scalar.machine(running)),
+        _numpy_right_hand_side(running),
     )
     if not np.allclose(
         compiled(SETTLING, settled), plain(SETTLING, settled), rtol=1e-6, atol=1e-6
@@ -256,29 +256,29 @@ def scipy_works(dynamics: PairDynamics) -> dict[str, Work]:
     }
 
 
-def _numpy_right_hand_side(dynamics: PairDynamics) -> RightHandSide:
+def _numpy_right_hand_side(running: RunningPair) -> RightHandSide:
     group, system, direction = (
-        pack([dynamics], 1e-6),
-        dynamics.equations,
-        dynamics.approach_direction(),
+        pack([running.dynamics], 1e-6),
+        running.equations,
+        running.approach_direction(),
     )
     n_dof, scratch = (
         len(system.mass),
         _classical_scheme.scratch(1, len(system.mass), "float64"),
     )
     motion, result = np.empty((4, LANES)), np.empty((N_LAW, LANES))
-    radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
+    radius, speed = running.table.pair.pinion.base_radius, running.operating.speed
 
     def slope(time: float, state: Array) -> Array:
         q, v = state[:n_dof], state[n_dof:]
-        roll = dynamics.teeth.start_roll + radius * (speed * time + q[2])
+        roll = running.teeth.start_roll + radius * (speed * time + q[2])
         motion[:] = np.array(
             [roll, direction @ q, direction @ v, radius * (speed + v[2])]
         )[:, None]
         _classical_scheme.law_at(group, motion.ravel(), *scratch, result.ravel())
         normal, friction, moment_p, moment_w, along = result[:5, 0]
         force = (
-            dynamics.set_force
+            running.dynamics.forces(np.zeros(1))[0]
             - system.governed_stiffness @ q
             - system.governed_damping @ v
             - normal * direction

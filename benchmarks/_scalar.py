@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from benchmarks._mesh_numbers import MeshNumbers, mesh_numbers
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.pair import RunningPair
 from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS
 from gensig.mesh.tooth_table import GearTeeth
 
@@ -48,26 +48,26 @@ class Machine(NamedTuple):
     force: Array
 
 
-def machine(dynamics: PairDynamics) -> Machine:
+def machine(running: RunningPair) -> Machine:
     """The numbers of one machine of six degrees of freedom."""
-    table, system = dynamics.table, dynamics.equations
+    table, system = running.table, running.equations
     if len(system.mass) != N_DOF:
         raise ValueError(
             f"{len(system.mass)} degrees of freedom; {N_DOF} are written out here"
         )
     return Machine(
-        mesh=mesh_numbers(dynamics),
+        mesh=mesh_numbers(running),
         pinion_kind=_kinds(table.pinion),
         wheel_kind=_kinds(table.wheel),
-        pinion_error=dynamics.teeth.errors[0],
-        wheel_error=dynamics.teeth.errors[1],
-        pinion_tilt=dynamics.teeth.tilts[0],
-        wheel_tilt=dynamics.teeth.tilts[1],
+        pinion_error=running.teeth.errors[0],
+        wheel_error=running.teeth.errors[1],
+        pinion_tilt=running.teeth.tilts[0],
+        wheel_tilt=running.teeth.tilts[1],
         table=np.stack(table.pairs, axis=-1)[:, :, 0],
         inverse_mass=1.0 / system.mass,
         stiffness=np.diag(system.governed_stiffness).copy(),
         damper=np.diag(system.governed_damping).copy(),
-        force=dynamics.set_force,
+        force=running.dynamics.forces(np.zeros(1))[0],
     )
 
 

@@ -21,7 +21,7 @@ from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.backends import group_motions
 from gensig.dynamics.backends.group_run import GroupRun
 from gensig.dynamics.decimation import Decimator, decimator
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.production import folder as generation
 from gensig.production import shard_writing
 from gensig.record import simulate as records
@@ -49,11 +49,11 @@ CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (shard_writing, "_folder_inputs", PLAN),
     (InputReader, "inputs", PLAN),
     (pair_machine, "_mesh_table", TABLES),
-    (pair_machine, "pair_dynamics", EQUATIONS),
+    (pair_machine, "running_pair", EQUATIONS),
     (pair_machine, "check_machine", EQUATIONS),
     (group_motions, "settling_time", EQUATIONS),
     (group_motions, "pack_group", EQUATIONS),
-    (PairDynamics, "static_start", EQUATIONS),
+    (Dynamics, "static_start", EQUATIONS),
     (GroupRun, "advance", SETTLING),
     (GroupRun, "record", RECORDING),
     (pair_machine, "checks", CHECKING),

@@ -26,7 +26,7 @@ from benchmarks._measure import add_quick
 from benchmarks._mesh_numbers import mesh_numbers
 from gensig.dynamics._vector import LANES
 from gensig.dynamics.decimation import decimator
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.pair import RunningPair
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.faults.registry import read_faults
 from gensig.mesh.face import slice_gaps
@@ -34,7 +34,7 @@ from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.pair_table import flank_sides, pair_table
 from gensig.mesh.tooth_table import ToothTable
 from gensig.plan.request import read_request
-from gensig.systems.pair_machine import GearPairMachine, pair_dynamics
+from gensig.systems.pair_machine import GearPairMachine, running_pair
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run
 
@@ -66,12 +66,12 @@ class Case:
     faults: tuple[Fault, ...]
 
     @property
-    def dynamics(self) -> PairDynamics:
+    def running(self) -> RunningPair:
         """Perfect gears, tooth 0 of either entering at A at time 0.
 
         What ``GearPairMachine.simulate`` takes unasked.
         """
-        return pair_dynamics(Run(system=self.system, faults=self.faults))
+        return running_pair(Run(system=self.system, faults=self.faults))
 
     @property
     def roll(self) -> Array:
@@ -189,19 +189,19 @@ def record(
     """Acceleration along the line of action over the last turns of the pinion, decimated,
     (sample,) m/s2.
     """
-    dynamics, low_pass = this.dynamics, decimator(oversampling)
+    running, low_pass = this.running, decimator(oversampling)
     rate = this.system.sensing.sampling_rate
     step = 1.0 / (rate * oversampling)
     n_samples, n_settle = (
         round(DURATION * rate),
-        math.ceil(dynamics.settling_time * rate),
+        math.ceil(running.dynamics.settling_time * rate),
     )
     first = -(low_pass.margin + n_settle)
     velocity = motion(
         mesh_of(this, law, n_loads),
-        mesh_numbers(dynamics),
-        dynamics,
-        dynamics.static_start(first / rate),
+        mesh_numbers(running),
+        running,
+        running.dynamics.static_start(first / rate),
         step=step,
         first_step=first * oversampling,
         n_steps=(n_settle + n_samples + 2 * low_pass.margin) * oversampling,
@@ -228,20 +228,20 @@ def static(this: Case, law: str) -> tuple[Array, Array]:
     """Approach and tangent stiffness under the set torque over one turn of the pinion, (phase,) m
     and N/m.
     """
-    dynamics, roll = this.dynamics, this.roll
+    running, roll = this.running, this.roll
     approach, stiffness = np.empty_like(roll), np.empty_like(roll)
     highest = (
         4.0
         * static_mesh(
-            dynamics.table, pair_states(dynamics.table, roll), dynamics.mesh_force
+            running.table, pair_states(running.table, roll), running.mesh_force
         ).approach.max()
     )
-    numbers = mesh_numbers(dynamics)
+    numbers = mesh_numbers(running)
     static_approach(
         mesh_of(this, law),
         numbers,
         roll,
-        dynamics.mesh_force,
+        running.mesh_force,
         highest,
         approach,
         stiffness,
@@ -251,7 +251,7 @@ def static(this: Case, law: str) -> tuple[Array, Array]:
 
 def resonance(this: Case, stiffness: float) -> float:
     """Natural frequency of the mesh mode, Hz."""
-    values = this.dynamics.equations.rates(np.array([stiffness]))
+    values = this.running.equations.rates(np.array([stiffness]))
     return float(np.abs(values.imag).max() / (2.0 * math.pi))
 
 
@@ -358,9 +358,9 @@ def check_rows() -> Iterator[Sequence[str]]:
         ]
         this, linear = own[1], case(20, fault, "mesh.contact=linear")
         theirs = static_mesh(
-            this.dynamics.table,
-            pair_states(this.dynamics.table, this.roll),
-            this.dynamics.mesh_force,
+            this.running.table,
+            pair_states(this.running.table, this.roll),
+            this.running.mesh_force,
         )
         approach, stiffness = static(this, "secant")
         finer = [

@@ -31,7 +31,7 @@ from gensig.production.folder import begin_folder, run_folder
 from gensig.production.shard_writing import write_shard
 from gensig.systems import pair_machine
 from gensig.systems.base import simulate_together
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import running_pair
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run, Start
 
@@ -237,7 +237,7 @@ def against_teeth(runs: int, sizes: Sizes) -> tuple[dict[str, float], dict[str, 
     def table(run: Run) -> None:
         pair_machine._mesh_table.cache_clear()
         sound_load.cache_clear()
-        pair_dynamics(run)
+        running_pair(run)
 
     for n_teeth in sizes.teeth:
         teeth = list(range(n_teeth))

@@ -16,9 +16,9 @@ import time
 import numpy as np
 
 from benchmarks._engine_line import DRAG, END_GEARS, engine_line, engine_torques
-from gensig.driveline.time.course import ShaftTorque
 from gensig.driveline.time.newmark import LineMotion, LineSolver, integrate_line
 from gensig.dynamics.decimation import in_band_error
+from gensig.dynamics.motion.course import ShaftTorque
 
 SPEED = 1688.0 * math.pi / 30.0
 RATE = 10240.0

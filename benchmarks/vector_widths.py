@@ -41,7 +41,7 @@ def rates(runs: int, precisions: Sequence[str] = PRECISIONS) -> dict[str, float]
     for precision in precisions:
         n = n_lanes(precision)
         works[f"pair {precision} x5"] = _rates.kernel(
-            pairs[:n], 5, precision, THREE_PAIRS
+            [pair.dynamics for pair in pairs[:n]], 5, precision, THREE_PAIRS
         )
         works[f"two-stage box {precision} x5"] = _rates.kernel(
             boxes[:n], 5, precision, box_core

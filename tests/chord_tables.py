@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gensig.dynamics.pair import Body, PairDynamics
+from gensig.dynamics.pair import Body, RunningPair
 from gensig.geometry.contact import GearPair
 from gensig.mesh.load_distribution import loaded_pair_table
 from gensig.mesh.pair_table import FIRST_PITCH, LAST_PITCH
@@ -138,11 +138,11 @@ def on_axial_supports(
     return replace(body, support=support, tilt_inertia=tilt_inertia)
 
 
-def with_table(dynamics: PairDynamics, table: ToothTable) -> PairDynamics:
+def with_table(running: RunningPair, table: ToothTable) -> RunningPair:
     """The same machine on another table, its gears held along their axes."""
     return replace(
-        dynamics,
-        teeth=replace(dynamics.teeth, table=table),
-        pinion=on_axial_supports(dynamics.pinion),
-        wheel=on_axial_supports(dynamics.wheel),
+        running,
+        teeth=replace(running.teeth, table=table),
+        pinion=on_axial_supports(running.pinion),
+        wheel=on_axial_supports(running.wheel),
     )

@@ -13,7 +13,8 @@ from hypothesis import settings
 
 import gensig.compilation
 from gensig.dynamics.mesh_teeth import MeshTeeth
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.motion.dynamics import Dynamics
+from gensig.dynamics.pair import RunningPair
 from gensig.geometry.gear import Gear
 from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
@@ -105,12 +106,22 @@ def gear_with(xiamen) -> Callable[..., Gear]:
 
 
 @pytest.fixture(scope="session")
-def dynamics_of() -> Callable[..., PairDynamics]:
-    """Equations of motion of a machine with perfect teeth, or with the given tooth errors."""
+def dynamics_of(running_of) -> Callable[..., Dynamics]:
+    """A machine in motion, as ``running_of`` has it."""
+
+    def make(*given: Any, **errors: Any) -> Dynamics:
+        return running_of(*given, **errors).dynamics
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def running_of() -> Callable[..., RunningPair]:
+    """A machine's pair with perfect teeth, or with the given tooth errors."""
 
     def make(
         system: GearPairMachine, faults=(), *, phase=0.3, **errors: Any
-    ) -> PairDynamics:
+    ) -> RunningPair:
         counts = {
             "pinion": system.pair.pinion.n_teeth,
             "wheel": system.pair.wheel.n_teeth,
@@ -121,7 +132,7 @@ def dynamics_of() -> Callable[..., PairDynamics]:
             for key in ("error", "tilt")
         }
         values |= errors
-        return PairDynamics(
+        return RunningPair(
             teeth=MeshTeeth(
                 table=system.mesh_table(faults),
                 errors=(values["pinion_error"], values["wheel_error"]),

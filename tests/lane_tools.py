@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,21 +13,21 @@ from gensig.dynamics._vector import LANES
 from gensig.dynamics.backends.base import Integration
 from gensig.dynamics.backends.nystroem.machine_lanes import pack
 from gensig.dynamics.backends.nystroem.method import Nystroem
-from gensig.dynamics.equations import STIFFER, Equations
-from gensig.dynamics.pair import Body, PairDynamics, Support
+from gensig.dynamics.motion.dynamics import Dynamics
+from gensig.dynamics.pair import Body, RunningPair, Support
 
 LAW = layout.Law._fields
 BRIEF = 1e-11  # s; the square of a change over such a step is 0, the slope of a gap over it is not
 NO_MEANS = np.empty(0), -1, 1, np.empty(0)
 
 
-def laws(dynamics: PairDynamics, motions: np.ndarray, step: float = 1e-6) -> np.ndarray:
+def laws(running: RunningPair, motions: np.ndarray, step: float = 1e-6) -> np.ndarray:
     """The mesh law at many instants, (instant, 8), columns as ``LAW`` names them.
 
     ``motions`` (instant, 4) holds roll, approach, its rate and the rate of the roll, or four
     such columns that broadcast.
     """
-    return group_laws(pack([dynamics], step), motions)
+    return group_laws(pack([running.dynamics], step), motions)
 
 
 def group_laws(group: layout.Group, motions: np.ndarray) -> np.ndarray:
@@ -54,7 +53,7 @@ def scratch_of(group):
     return _classical_scheme.scratch(group.n_meshes, n_dof, "float64")
 
 
-def law_of(dynamics: PairDynamics, step: float = 1e-6) -> Callable[..., np.ndarray]:
+def law_of(dynamics: Dynamics, step: float = 1e-6) -> Callable[..., np.ndarray]:
     """The mesh law (8,) as a function of roll, approach, its rate and the rate of the roll.
 
     The next call overwrites the result.
@@ -73,12 +72,12 @@ def law_of(dynamics: PairDynamics, step: float = 1e-6) -> Callable[..., np.ndarr
     return law
 
 
-def with_teeth(dynamics: PairDynamics, **changes) -> PairDynamics:
+def with_teeth(running: RunningPair, **changes) -> RunningPair:
     """The pair with some of its teeth's values changed."""
-    return replace(dynamics, teeth=replace(dynamics.teeth, **changes))
+    return replace(running, teeth=replace(running.teeth, **changes))
 
 
-def on_any_bodies(teeth, force: float, operating) -> PairDynamics:
+def on_any_bodies(teeth, force: float, operating) -> RunningPair:
     """A gear pair of some teeth under a mean force in N, on bodies of 1 kg."""
     support = Support(
         stiffness_x=1.0,
@@ -90,7 +89,7 @@ def on_any_bodies(teeth, force: float, operating) -> PairDynamics:
     )
     body = Body(mass=1.0, inertia=1.0, support=support, tilt_inertia=1.0)
     torque = force * teeth.pair.pinion.base_radius
-    return PairDynamics(
+    return RunningPair(
         teeth=teeth,
         pinion=body,
         wheel=body,
@@ -98,17 +97,19 @@ def on_any_bodies(teeth, force: float, operating) -> PairDynamics:
     )
 
 
-def motion_of(dynamics, times, q, v):
+def motion_of(running, times, q, v):
     """Roll, approach, its rate and the rate of the roll at states (time, dof), for ``laws``."""
-    radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
-    direction = dynamics.approach_direction()
-    roll = dynamics.teeth.start_roll + radius * (speed * times + q[..., 2])
+    radius, speed = running.table.pair.pinion.base_radius, running.operating.speed
+    direction = running.approach_direction()
+    roll = running.teeth.start_roll + radius * (speed * times + q[..., 2])
     return roll, q @ direction, v @ direction, radius * (speed + v[..., 2])
 
 
-def advance(dynamics, q, v, step, first_step, n_steps, channels=()):
+def advance(running, q, v, step, first_step, n_steps, channels=()):
     """q and v (dof,) after some steps, and mean accelerations over each, (channel, step)."""
-    return _advance(pack([dynamics], step), q, v, step, first_step, n_steps, channels)
+    return _advance(
+        pack([running.dynamics], step), q, v, step, first_step, n_steps, channels
+    )
 
 
 def _advance(group, q, v, step, first_step, n_steps, channels=()):
@@ -139,45 +140,23 @@ def _advance(group, q, v, step, first_step, n_steps, channels=()):
     return whole, state[1, :, 0].copy(), means[:, :, 0].T.copy()
 
 
-def trajectory(dynamics, q, v, step, n_steps):
+def trajectory(running, q, v, step, n_steps):
     """q and v at time 0 and at the end of every internal step, (1 + n_steps, dof) each."""
-    group, states = pack([dynamics], step), [(q, v)]
+    group, states = pack([running.dynamics], step), [(q, v)]
     for n in range(n_steps):
         q, v, _ = _advance(group, q, v, step, n, 1)
         states.append((q, v))
     return tuple(np.array(part) for part in zip(*states, strict=True))
 
 
-def right_hand_side(dynamics, time, q, v):
+def right_hand_side(running, time, q, v):
     """q'' at one instant, (dof,): mean accelerations over two brief steps, extrapolated to 0."""
-    channels = tuple(range(len(dynamics.dofs)))
+    channels = tuple(range(len(running.dofs)))
     short, long = (
-        advance(dynamics, q, v, step, round(time / step), 1, channels)[2][:, 0]
+        advance(running, q, v, step, round(time / step), 1, channels)[2][:, 0]
         for step in (BRIEF, 2 * BRIEF)
     )
     return 2 * short - long
-
-
-@dataclass(frozen=True, eq=False)
-class Changed:
-    """A gear pair with other equations, and with a force ``push`` N beside its own, (dof,)."""
-
-    pair: PairDynamics
-    equations: Equations
-    push: np.ndarray | float = 0.0
-
-    def __getattr__(self, name):
-        return getattr(self.pair, name)
-
-    @cached_property
-    def stiff_rates(self):
-        return self.equations.rates(STIFFER * self.pair.mesh_stiffness)
-
-    def forces(self, times):
-        return self.pair.forces(times) + self.push
-
-    def factors(self, times):
-        return np.ones((len(times), len(self.equations.sources)))
 
 
 def motions(*machines, channels, duration=0.02, oversampling=8):

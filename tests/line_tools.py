@@ -13,9 +13,7 @@ import numpy as np
 from benchmarks._phase_mesh import phase_table, plain_pair
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time._line_mesh_kernels import mesh_law
-from gensig.driveline.time.course import ShaftTorque, constant_speed
 from gensig.driveline.time.line_arrays import pack_meshes
-from gensig.driveline.time.line_dynamics import LineDynamics
 from gensig.driveline.time.newmark import LineMotion, LineSolver, _Run, _scratch
 from gensig.dynamics.equations import (
     A_TURN,
@@ -26,7 +24,8 @@ from gensig.dynamics.equations import (
     Mesh,
 )
 from gensig.dynamics.mesh_teeth import MeshTeeth
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.motion.course import ShaftTorque, constant_speed
+from gensig.dynamics.motion.dynamics import Dynamics
 
 RADII, INERTIAS, TEETH = (0.05, 0.1), (0.01, 0.05), (20, 40)
 STIFFNESS = 3e8  # N/m
@@ -38,12 +37,12 @@ IMPLICIT = (
 )
 
 
-def line_of(system: Equations, names: Sequence[str] = (), **more) -> LineDynamics:
+def line_of(system: Equations, names: Sequence[str] = (), **more) -> Dynamics:
     """A line that turns at 0 rad/s and feels nothing."""
     n = len(system.mass)
-    return LineDynamics(
+    return Dynamics(
         **{
-            "names": tuple(names) or tuple(f"disc_{i}" for i in range(n)),
+            "dofs": tuple(names) or tuple(f"disc_{i}" for i in range(n)),
             "system": system,
             "nominal": constant_speed(0.0),
             "torques": (),
@@ -87,6 +86,7 @@ def turning_mesh(teeth: MeshTeeth, damping: float = 0.0) -> Mesh:
         touched=np.array([NONE, NONE, 0, NONE, NONE, 1]),
         reach=reach,
         slide=np.zeros(N_IN_PLANE),
+        stiffness=teeth.mean_stiffness(1.0),
         damping=damping,
         mean_force=1.0,
         speed=1.0,
@@ -101,7 +101,7 @@ def two_gears(
     damping: float = 0.0,
     drive: tuple[float, float] | None = None,
     **more,
-) -> LineDynamics:
+) -> Dynamics:
     """Two inertias and one mesh between them; ``drive`` is a spring and a damper of the first to
     the nominal angle.
     """
@@ -116,7 +116,7 @@ def two_gears(
     return line_of(system, ("first", "second"), **more)
 
 
-def chain(n: int, *, loss: float = 2e-5, seed: int = 0) -> LineDynamics:
+def chain(n: int, *, loss: float = 2e-5, seed: int = 0) -> Dynamics:
     """A free chain of inertias without gears."""
     rng = np.random.default_rng(seed)
     stiffness = np.zeros((n, n))
@@ -127,32 +127,19 @@ def chain(n: int, *, loss: float = 2e-5, seed: int = 0) -> LineDynamics:
     return line_of(bodies(mass, stiffness, loss * stiffness, np.ones(n)))
 
 
-def pair_line(dynamics: PairDynamics, **more) -> LineDynamics:
-    """A gear pair with its supports and drive as a line with one mesh, with all of its torques."""
-    return line_of(
-        dynamics.equations,
-        dynamics.dofs,
-        **{
-            "nominal": constant_speed(dynamics.operating.speed),
-            "torques": constant_torques(dynamics.set_force),
-            **more,
-        },
-    )
-
-
 def constant_torques(values: np.ndarray) -> tuple[ShaftTorque, ...]:
     return tuple(
         ShaftTorque(dof=i, table=np.array([value])) for i, value in enumerate(values)
     )
 
 
-def with_system(line: LineDynamics, **changes) -> LineDynamics:
+def with_system(line: Dynamics, **changes) -> Dynamics:
     """The line with other numbers of its bodies, springs and meshes."""
     return replace(line, system=replace(line.system, **changes))
 
 
 def state_after(
-    line: LineDynamics,
+    line: Dynamics,
     start: tuple[np.ndarray, np.ndarray],
     duration: float,
     n_steps: int,

@@ -8,7 +8,7 @@ import numpy as np
 from lane_tools import law_of
 from scipy.integrate import solve_ivp
 
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.motion.dynamics import Dynamics
 
 Slope = Callable[[float, np.ndarray], np.ndarray]
 
@@ -18,7 +18,7 @@ LIKELY = np.repeat([1e-6, 1e-2], 6) * np.tile([1, 1, 20, 1, 1, 20], 2)
 
 
 def equations(
-    dynamics: PairDynamics,
+    dynamics: Dynamics,
     *,
     prescribed: bool = False,
     damped_by_stiffness: float | None = None,
@@ -28,12 +28,14 @@ def equations(
     ``prescribed`` lets the mesh roll with the set speed, not with the pinion. A number of seconds
     damps the force by that times its rate, c proportional to k, in place of the law's own damping.
     """
-    system, direction = dynamics.equations, dynamics.approach_direction()
+    system, (teeth,) = dynamics.system, dynamics.teeth
+    direction = system.meshes[0].push(len(dynamics.dofs))
     law, mass = law_of(dynamics), system.mass[:, None]
-    radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
+    radius, speed = teeth.pair.pinion.base_radius, dynamics.nominal.at(0.0).speed
     free = np.eye(12, k=6)
     free[6:] = -np.hstack([system.governed_stiffness, system.governed_damping]) / mass
-    pushed = np.concatenate([np.zeros(6), dynamics.set_force / system.mass])
+    force = dynamics.forces(np.zeros(1))[0]
+    pushed = np.concatenate([np.zeros(6), force / system.mass])
     # motion of the mesh by state
     motion = np.zeros((4, 12))
     motion[1, :6] = motion[2, 6:] = direction
@@ -45,7 +47,7 @@ def equations(
     forces[[6, 9], 1] = 1, -1
     forces[[8, 11, 8], [2, 3, 4]] = 1, 1, radius
     forces[6:] /= mass
-    start = np.array([dynamics.teeth.start_roll, 0, 0, radius * speed])
+    start = np.array([teeth.start_roll, 0, 0, radius * speed])
     rate = np.array([radius * speed, 0, 0, 0])
 
     def slope(t, y):
@@ -80,6 +82,6 @@ def solved(
     ).y.T
 
 
-def at_rest(dynamics: PairDynamics, time: float = 0.0) -> np.ndarray:
+def at_rest(dynamics: Dynamics, time: float = 0.0) -> np.ndarray:
     """State of a machine at rest in static equilibrium at a time."""
     return np.concatenate([dynamics.static_start(time), np.zeros(6)])

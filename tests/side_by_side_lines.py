@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 from stacked_motions import integrate, stacked
 
-from gensig.driveline.time.course import ShaftTorque, constant_speed
-from gensig.driveline.time.line_dynamics import LineDynamics
 from gensig.dynamics.backends.base import Integration
 from gensig.dynamics.backends.registry import BACKENDS
 from gensig.dynamics.decimation import in_band_error
 from gensig.dynamics.integrator import Solver
-from gensig.dynamics.pair import PINION_ROTATION, WHEEL_ROTATION
+from gensig.dynamics.pair import PINION_ROTATION
 from gensig.sensing.manufacturing import draw_specimen
 from gensig.systems.base import further_gears, simulate_together
 from gensig.systems.run import CleanRecord, Run, Start
@@ -24,18 +22,16 @@ CHANNELS = ("pinion_x", "pinion_y", "wheel_x", "wheel_y", "wheel_rotation")
 
 def as_line(pair):
     """A gear pair without rotors as a line of one mesh, whose bodies stand in another order."""
-    system = pair.equations
+    system = pair.system
     order = np.array([*WHEEL_FIRST, *range(6, len(pair.dofs))])
     places = np.argsort(order)
-    pinion, wheel = (int(places[dof]) for dof in (PINION_ROTATION, WHEEL_ROTATION))
+    pinion = int(places[PINION_ROTATION])
     both = np.ix_(order, order)
     (mesh,) = system.meshes
-    friction_torque = np.zeros(len(system.mass))
-    friction_torque[pinion] = pair.friction_torque()
-    torque = pair.operating.torque
-    driven = np.array([-torque * pair.table.pair.ratio])
-    return LineDynamics(
-        names=tuple(pair.dofs[dof] for dof in order),
+    torques = [replace(each, dof=int(places[each.dof])) for each in pair.torques]
+    return replace(
+        pair,
+        dofs=tuple(pair.dofs[dof] for dof in order),
         system=replace(
             system,
             mass=system.mass[order],
@@ -47,13 +43,8 @@ def as_line(pair):
             reference=pinion,
             angles=(pinion,),
         ),
-        nominal=constant_speed(pair.operating.speed),
-        torques=(
-            ShaftTorque(dof=pinion, table=np.array([torque])),
-            ShaftTorque(dof=wheel, table=driven),
-        ),
-        friction_torque=friction_torque,
-        reference_force=np.array([pair.mesh_force]),
+        torques=tuple(torques),
+        friction_torque=pair.friction_torque[order],
     )
 
 

@@ -46,7 +46,7 @@ from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.modification import PLAIN, FlankModification, PairModification
 from gensig.options.configuration import Configuration
-from gensig.systems.pair_machine import GearPairMachine, pair_dynamics
+from gensig.systems.pair_machine import GearPairMachine, running_pair
 from gensig.systems.registry import read_material
 from gensig.systems.run import Run
 
@@ -246,9 +246,9 @@ def drive_line_of_pair(system: GearPairMachine, name: str) -> DriveLine:
     Without the soft drive.
     The mesh is held at the mean stiffness of healthy teeth under the set torque.
     """
-    dynamics = pair_dynamics(Run(system=system, faults=()))
+    running = running_pair(Run(system=system, faults=()))
     pair = system.pair
-    bodies, rotors = (dynamics.pinion, dynamics.wheel), (system.motor, system.load)
+    bodies, rotors = (running.pinion, running.wheel), (system.motor, system.load)
     sides = tuple(zip(SIDES, pair.gears.values(), bodies, rotors, strict=True))
     nodes = [Node(name=side, inertia=body.inertia) for side, _, body, _ in sides]
     gears = [
@@ -272,8 +272,8 @@ def drive_line_of_pair(system: GearPairMachine, name: str) -> DriveLine:
     mesh = GearMesh(
         driving=0,
         driven=1,
-        stiffness=dynamics.mean_mesh_stiffness,
-        damping=dynamics.mesh_damping,
+        stiffness=running.mean_mesh_stiffness,
+        damping=running.mesh_damping,
         backlash=pair.backlash,
         pressure_angle=pair.working_pressure_angle,
     )

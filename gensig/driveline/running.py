@@ -22,8 +22,6 @@ from gensig.driveline.linear.forced import closed_line, steady_response
 from gensig.driveline.linear.matrices import LineMatrices
 from gensig.driveline.linear.modal import with_local_losses, with_viscous_losses
 from gensig.driveline.mesh_phase import start_phases
-from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
-from gensig.driveline.time.line_dynamics import LineDynamics
 from gensig.driveline.time.newmark import (
     LineMotion,
     LineSolver,
@@ -41,6 +39,8 @@ from gensig.dynamics.equations import (
     Mesh,
 )
 from gensig.dynamics.mesh_teeth import MeshTeeth
+from gensig.dynamics.motion.course import LineCourse, ShaftTorque, constant_speed
+from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import ConfigError, StepError
 from gensig.geometry.contact import GearPair
 from gensig.mesh.even_table import even_table
@@ -130,7 +130,7 @@ class RunningLine:
 
     machine: EngineLine
     matrices: LineMatrices
-    dynamics: LineDynamics
+    dynamics: Dynamics
     mesh_force: Array
     teeth: Mapping[int, MeshTeeth]
 
@@ -222,8 +222,8 @@ def running_line(
         reference_force(machine, m, force)
         for m, force in enumerate(mesh_force.tolist())
     ]
-    dynamics = LineDynamics(
-        names=matrices.names,
+    dynamics = Dynamics(
+        dofs=matrices.names,
         system=system,
         nominal=nominal,
         torques=_torques(machine, matrices, course, turned, first),
@@ -330,14 +330,16 @@ def _mesh(
     is_there = touched != NONE
     reach = np.where(is_there, matrices.directions[number][touched], 0.0)
     damping = float(matrices.mesh_damping[number])
+    reference = reference_force(machine, number, force)
     return Mesh(
         name=machine.mesh_names[number],
         teeth=teeth,
         touched=touched,
         reach=reach,
         slide=_slide(reach, _turning_sense(machine, number)),
+        stiffness=teeth.mean_stiffness(reference),
         # so many N s/m under the mean force; a mesh that carries less is damped less
-        damping=damping / reference_force(machine, number, force),
+        damping=damping / reference,
         mean_force=force,
         speed=abs(float(matrices.rigid[0][touched[A_TURN]])) * speed,
     )

@@ -5,10 +5,8 @@ Gear pairs and drive lines are integrated by these alone.
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -23,9 +21,6 @@ Array = NDArray[np.float64]
 A_X, A_Y, A_TURN, B_X, B_Y, B_TURN, N_IN_PLANE = range(7)
 N_MOTIONS = 12  # of helical gears
 NONE = -1  # for a gear that does not move so
-LONGEST_SETTLING = 0.45  # s
-SETTLED = 1e-4  # share of the start's transient that is left
-STIFFER = 1.2  # than their mean stiffness are meshes taken for the longest step
 # of the first six in a gear pair, whose y is the line of action
 PAIR_SLIDE = (1.0, 0.0, 0.0, -1.0, 0.0, 0.0)
 
@@ -39,6 +34,7 @@ class Mesh:
     touched : (motion,)    degrees of freedom that it acts on, ``NONE`` where there is none
     reach : (motion,)      gradient of the approach along them
     slide : (motion,)      direction of its friction
+    stiffness : N/m        mean one under the force at which contact and damping are taken
     damping : N s/m, of the one-sided law per N of the force of a pair of teeth
     mean_force : N
     speed : rad/s          of gear a at the set-point
@@ -49,6 +45,7 @@ class Mesh:
     touched: NDArray[np.int64]
     reach: Array
     slide: Array
+    stiffness: float
     damping: float
     mean_force: float
     speed: float
@@ -57,6 +54,12 @@ class Mesh:
         """Approach of the flanks at a deflection (dof,), m."""
         moved = np.where(self.touched == NONE, 0.0, deflection[self.touched])
         return float(self.reach @ moved)
+
+    def damping_under(self, force: float) -> float:
+        """Damping under a mean force in N, N s/m."""
+        if self.teeth.table.options.law == "one_sided":
+            return self.damping * force
+        return self.damping
 
     @property
     def turn(self) -> int:
@@ -198,78 +201,3 @@ class Equations:
             and np.array_equal(plane[[A_X, A_Y, B_X, B_Y]], [0.0, -1.0, 0.0, 1.0])
             and self.rotation[A_TURN] == 1.0
         )
-
-
-class Dynamics(ABC):
-    """A machine in motion, which can be integrated: a gear pair, or a line of several meshes."""
-
-    @property
-    @abstractmethod
-    def dofs(self) -> tuple[str, ...]:
-        """Names of the degrees of freedom."""
-
-    @property
-    @abstractmethod
-    def equations(self) -> Equations:
-        """The machine as numbers."""
-
-    @property
-    @abstractmethod
-    def mesh_stiffness(self) -> Array:
-        """Mean stiffness of every mesh, (mesh,) N/m."""
-
-    @property
-    @abstractmethod
-    def is_steady(self) -> bool:
-        """True where neither speed nor torques change over time."""
-
-    @property
-    @abstractmethod
-    def rest(self) -> Array:
-        """Deflection about which the machine moves, its reference not turned, (dof,)."""
-
-    @abstractmethod
-    def start(self, time: float) -> tuple[Array, Array]:
-        """Deflections and their rates from which a motion settles at a nominal time, (dof,) each.
-
-        Rates are 0 where the machine starts at rest.
-        """
-
-    @abstractmethod
-    def course(self, times: Array) -> tuple[Array, Array]:
-        """Angle in rad since time 0 and speed in rad/s of the reference at times in s, (time,).
-
-        ``times`` increase and hold 0.
-        """
-
-    @abstractmethod
-    def forces(self, times: Array) -> Array:
-        """Torques and forces that follow no angle, on the degrees of freedom, (time, dof)."""
-
-    @abstractmethod
-    def factors(self, times: Array) -> Array:
-        """Factors of the torques over an angle at times in s, (time, source)."""
-
-    @cached_property
-    def stiff_rates(self) -> NDArray[np.complex128]:
-        """Eigenvalues that the steps must follow: of meshes stiffer than their mean, 1/s."""
-        return self.equations.rates(STIFFER * self.mesh_stiffness)
-
-    @cached_property
-    def settling_time(self) -> float:
-        """Time in which the slowest motion that is held falls to 1e-4 (longest 0.45 s), s."""
-        decay = -np.real(self.equations.rates(self.mesh_stiffness))
-        slowest = float(decay[decay > 1e-3].min(initial=np.inf))
-        return min(LONGEST_SETTLING, math.log(1.0 / SETTLED) / slowest)
-
-    @property
-    def stiffest_motion(self) -> str:
-        """Degree of freedom that springs, dampers and meshes hold hardest for its mass."""
-        equations = self.equations
-        spring, damper = np.diag(equations.stiffness), np.diag(equations.damping)
-        held = spring + equations.held**2
-        damped = damper + equations.held_damping * equations.held**2
-        for mesh, stiffness in zip(equations.meshes, self.mesh_stiffness, strict=True):
-            held = held + stiffness * mesh.push(len(held)) ** 2
-        rates = np.sqrt(held / equations.mass), damped / equations.mass
-        return self.dofs[int(np.argmax(np.maximum(*rates)))]

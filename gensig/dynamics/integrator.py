@@ -18,7 +18,8 @@ from gensig.dynamics.backends.step_limits import (
     CoarseStepWarning,
     warn_of_coarse_step,
 )
-from gensig.dynamics.pair import DOFS, PairDynamics
+from gensig.dynamics.motion.dynamics import Dynamics
+from gensig.dynamics.pair import DOFS
 from gensig.errors import ConfigError, SimulationError
 
 __all__ = [
@@ -82,7 +83,7 @@ class Solver:
 
 
 def integrate(
-    machines: Sequence[PairDynamics],
+    machines: Sequence[Dynamics],
     solver: Solver,
     *,
     sampling_rate: float,
@@ -122,7 +123,7 @@ def records_together(solver: Solver) -> int:
     return BACKENDS[solver.backend].records_together(solver.precision)
 
 
-def check_machine(dynamics: PairDynamics, solver: Solver, sampling_rate: float) -> None:
+def check_machine(dynamics: Dynamics, solver: Solver, sampling_rate: float) -> None:
     """Raise SimulationError for a machine that the backend cannot integrate at this step.
 
     Warns of a coarse step whose error is not looked at.

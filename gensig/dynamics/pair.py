@@ -8,14 +8,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.bodies import HOUSING, Bodies, Motion, Spring
-from gensig.dynamics.equations import PAIR_SLIDE, Dynamics, Equations, Mesh
+from gensig.dynamics.equations import PAIR_SLIDE, Equations, Mesh
 from gensig.dynamics.helical import AXIAL_DOFS, axial_reach, pitches
 from gensig.dynamics.mesh_teeth import MeshTeeth
+from gensig.dynamics.motion.course import SetCourse, ShaftTorque
+from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import ConfigError
 from gensig.mesh.tooth_table import ToothTable
 from gensig.operation.setpoint import Operating
@@ -31,7 +34,7 @@ PAIR_DOFS = (
     "wheel_y",
     "wheel_rotation",
 )
-# all that a machine may have; ``PairDynamics.dofs`` lists its own
+# all that a machine may have; ``RunningPair.dofs`` lists its own
 DOFS = (*PAIR_DOFS, *AXIAL_DOFS, "motor_rotation", "load_rotation")
 APPROACH_SIGN = (0.0, -1.0, 1.0, 0.0, 1.0, -1.0)
 # indices in PAIR_DOFS
@@ -130,9 +133,10 @@ def solid_disc(
     return mass, 0.5 * mass * (radius**2 + bore_radius**2)
 
 
+@final
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PairDynamics(Dynamics):
-    """All parameters of the motion of one gear pair.
+class RunningPair:
+    """A gear pair ready to be integrated.
 
     No slots: the equations are cached.
     """
@@ -210,20 +214,10 @@ class PairDynamics(Dynamics):
         """Tooth meshing frequency at the set speed, Hz."""
         return self.operating.speed / (2.0 * math.pi) * self.table.pair.pinion.n_teeth
 
-    @property
-    def driven_inertia(self) -> float:
-        """Inertia of the wheel and its load, kg m2."""
-        if self.load is None:
-            return self.wheel.inertia
-        return self.wheel.inertia + self.load.inertia
-
-    @property
+    @cached_property
     def reduced_inertia(self) -> float:
         """Inertia of all rotating bodies, reduced to the pinion, kg m2."""
-        driving = self.pinion.inertia
-        if self.motor is not None:
-            driving += self.motor.inertia
-        return driving + self.driven_inertia / self.table.pair.ratio**2
+        return float(self.bodies.mass @ self.bodies.rotation**2)
 
     @property
     def drive_stiffness(self) -> float:
@@ -276,20 +270,34 @@ class PairDynamics(Dynamics):
         return 1.0 / self.table.pair.ratio
 
     @cached_property
-    def set_force(self) -> Array:
-        """Forces at the set torque, (dof,); all of them follow a torque profile.
+    def dynamics(self) -> Dynamics:
+        """The pair in motion; all torques follow the profile of the set torque."""
+        torque, (driver, driven) = self.operating.torque, self._ends
+        load = -torque * self.table.pair.ratio
+        friction_torque = np.zeros(len(self.dofs))
+        friction_torque[driver] = self._at_drive(self.friction_torque())
+        return Dynamics(
+            dofs=self.dofs,
+            system=self.equations,
+            nominal=SetCourse(operating=self.operating),
+            torques=(
+                ShaftTorque(dof=driver, table=np.array([self._at_drive(torque)])),
+                ShaftTorque(dof=driven, table=np.array([load])),
+            ),
+            friction_torque=friction_torque,
+            reference_force=np.array([self.mesh_force]),
+        )
+
+    def _at_drive(self, torque: float) -> float:
+        """Force on the drive's degree of freedom that puts a torque on the pinion, N m.
 
         The soft speed source acts on the deviation from the set rotation, so it is a spring and a
         damper on the motor if there is one, else on the pinion. Its set angle leads by the wind-up
         of the mean torque, so that the mean deviation of the pinion is about 0.
         """
-        force, (driver, driven) = np.zeros(len(self.dofs)), self._ends
-        force[driver] = self.operating.torque + self.friction_torque()
-        if self.motor is not None:
-            lead = self.drive_stiffness * force[driver] / self.motor.coupling_stiffness
-            force[driver] += lead
-        force[driven] = -self.operating.torque * self.table.pair.ratio
-        return force
+        if self.motor is None:
+            return torque
+        return torque + self.drive_stiffness * torque / self.motor.coupling_stiffness
 
     def approach_direction(self) -> Array:
         """Gradient of the approach along the line of action, (dof,)."""
@@ -312,14 +320,9 @@ class PairDynamics(Dynamics):
         root = math.sqrt(self.mean_mesh_stiffness * self.equivalent_mass)
         return 2.0 * self.table.options.damping_ratio * root
 
-    @property
-    def mesh_stiffness(self) -> Array:
-        """As ``Dynamics.mesh_stiffness``."""
-        return np.array([self.mean_mesh_stiffness])
-
     @cached_property
     def equations(self) -> Equations:
-        """As ``Dynamics.equations``: one mesh, held by the soft speed source alone."""
+        """The pair as numbers: one mesh, held by the soft speed source alone."""
         bodies, options, (driver, _) = self.bodies, self.table.options, self._ends
         n_touched, force = len(self.gear_dofs), self.mesh_force
         held = np.zeros(len(self.dofs))
@@ -332,6 +335,7 @@ class PairDynamics(Dynamics):
             touched=np.arange(n_touched),
             reach=self.approach_direction()[:n_touched],
             slide=slide,
+            stiffness=self.mean_mesh_stiffness,
             damping=self.mesh_damping / (force if options.law == "one_sided" else 1.0),
             mean_force=force,
             speed=self.operating.speed,
@@ -349,90 +353,9 @@ class PairDynamics(Dynamics):
             angles=(PINION_ROTATION,),
         )
 
-    @property
-    def is_steady(self) -> bool:
-        """True where neither speed nor torque changes."""
-        return self.operating.is_steady
-
-    def course(self, times: Array) -> tuple[Array, Array]:
-        """As ``Dynamics.course``; the speed is straight between the times."""
-        speed = self.operating.nominal(times).speed
-        turned = 0.5 * (speed[1:] + speed[:-1]) * np.diff(times)
-        now = int(np.searchsorted(times, 0.0))
-        # from time 0 outwards, so that an instant has the same bits in any span
-        before = -np.cumsum(turned[:now][::-1])[::-1]
-        return np.concatenate([before, [0.0], np.cumsum(turned[now:])]), speed
-
-    def forces(self, times: Array) -> Array:
-        """As ``Dynamics.forces``: all of them follow the torque."""
-        return np.outer(self.operating.nominal(times).torque_factor, self.set_force)
-
-    def factors(self, times: Array) -> Array:
-        """As ``Dynamics.factors``: no torque follows an angle."""
-        return np.zeros((len(times), 0))
-
     def friction_torque(self) -> float:
         """Mean friction torque reduced to the pinion, N m."""
         return self.teeth.friction_torque(self.mesh_force)
-
-    @cached_property
-    def rest(self) -> Array:
-        """Deflections of supports and couplings about which the machine moves, (dof,).
-
-        The pinion has not turned.
-        """
-        start = self.static_start(0.0)
-        return np.asarray(start - self.equations.rotation * start[PINION_ROTATION])
-
-    def start(self, time: float) -> tuple[Array, Array]:
-        """As ``Dynamics.start``: at rest."""
-        deflection = self.static_start(time)
-        return deflection, np.zeros(len(deflection))
-
-    def static_start(self, time: float) -> Array:
-        """Equilibrium at a nominal time: deflected supports and couplings, approach, (dof,).
-
-        Under a nominal acceleration it is that of the accelerated machine. A ripple is left out:
-        it is too fast for an equilibrium.
-        """
-        pair, (driver, driven) = self.table.pair, self._ends
-        set_force, stiffness = self.set_force, self.equations.governed_stiffness
-        times, radius = np.array([time]), pair.pinion.base_radius
-        smooth = self.operating.without_ripple.nominal(times)
-        factor = float(self.operating.nominal(times).torque_factor[0])
-        acceleration = float(smooth.acceleration[0])
-        wheel_acceleration = acceleration / pair.ratio
-        inertia_torque = wheel_acceleration * self.driven_inertia
-        force = factor * self.mesh_force + inertia_torque / pair.wheel.base_radius
-        start = np.zeros(len(set_force))
-        start[PINION_ROTATION] -= acceleration / self._drive_rate**2
-        if self.motor is not None:
-            lead = factor * set_force[driver] / stiffness[driver, driver]
-            start[driver] = start[PINION_ROTATION] + lead
-            torque = acceleration * (self.reduced_inertia - self.motor.inertia)
-            start[PINION_ROTATION] -= torque / self.motor.coupling_stiffness
-        advance = radius * start[PINION_ROTATION]
-        elapsed = float(self.operating.time_at_set_speed(times)[0])
-        roll = self.teeth.start_roll + radius * self.operating.speed * elapsed + advance
-        static = self.teeth.static(self.teeth.states(np.array([roll])), force)
-        approach = float(static.approach[0])
-        if not math.isfinite(approach):
-            approach = 0.0
-        reach = self.approach_direction()
-        axial = range(len(PAIR_DOFS), len(self.gear_dofs))
-        for dof in (PINION_Y, WHEEL_Y, *axial):
-            if stiffness[dof, dof] > 0.0:
-                start[dof] = -reach[dof] * force / stiffness[dof, dof]
-        pushed = start[WHEEL_Y] - start[PINION_Y]
-        for dof in axial:
-            pushed += reach[dof] * start[dof]
-        start[WHEEL_ROTATION] = (pushed - approach + advance) / pair.wheel.base_radius
-        if self.load is not None:
-            inertia_torque = wheel_acceleration * self.load.inertia
-            torque = factor * set_force[driven] - inertia_torque
-            twist = torque / self.load.coupling_stiffness
-            start[driven] = start[WHEEL_ROTATION] + twist
-        return start
 
 
 def _in_plane(name: str, body: Body, speed: float) -> tuple[Motion, ...]:

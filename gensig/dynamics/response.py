@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.linear_system import LinearSystem
-from gensig.dynamics.pair import Body, PairDynamics
+from gensig.dynamics.motion.dynamics import Dynamics
+from gensig.dynamics.pair import Body, RunningPair
 from gensig.units import check_choice
 
 Array = NDArray[np.float64]
@@ -79,8 +80,8 @@ class LinearMachine(ABC):
         """
 
 
-def accelerations(dynamics: PairDynamics, frequency: Array, force: Complex) -> Complex:
-    """Accelerations under harmonic forces, with the mesh held at its mean stiffness and damping.
+def accelerations(dynamics: Dynamics, frequency: Array, force: Complex) -> Complex:
+    """Accelerations under harmonic forces, each mesh held at its mean stiffness and damping.
 
     Parameters
     ----------
@@ -91,10 +92,12 @@ def accelerations(dynamics: PairDynamics, frequency: Array, force: Complex) -> C
     -------
     (line, dof) m/s2 or rad/s2, complex
 
-    Source: -w^2 (K + i w C - w^2 M)^-1 F of the linear system, K and C with the mesh's k h h^T
-    and c h h^T. Assumes forces so small that teeth stay in contact at the same positions.
+    Source: -w^2 (K + i w C - w^2 M)^-1 F of the linear system, K and C with k h h^T and c h h^T of
+    every mesh. Assumes forces so small that teeth stay in contact at the same positions.
     """
-    stiffness, damping = dynamics.equations.closed(*_mesh_of(dynamics))
+    stiffness, damping = dynamics.equations.closed(
+        dynamics.mesh_stiffness, dynamics.mesh_damping
+    )
     line = LinearSystem(
         mass=np.diag(dynamics.equations.mass),
         stiffness=stiffness,
@@ -105,13 +108,8 @@ def accelerations(dynamics: PairDynamics, frequency: Array, force: Complex) -> C
     return np.asarray(-(frequency[:, None] ** 2) * displacement)
 
 
-def _mesh_of(dynamics: PairDynamics) -> tuple[Array, Array]:
-    """Mean stiffness and damping of the mesh, (mesh,) N/m and N s/m."""
-    return dynamics.mesh_stiffness, np.array([dynamics.mesh_damping])
-
-
-def natural_frequencies(dynamics: PairDynamics) -> tuple[Array, Array]:
-    """Natural frequencies of a pair with its mesh held at its mean stiffness and damping.
+def natural_frequencies(dynamics: Dynamics) -> tuple[Array, Array]:
+    """Natural frequencies of a machine with its meshes held at their mean stiffness and damping.
 
     Returns
     -------
@@ -120,7 +118,7 @@ def natural_frequencies(dynamics: PairDynamics) -> tuple[Array, Array]:
 
     Source: eigenvalues lambda of M q'' + C q' + K q = 0, K and C as in ``accelerations``.
     """
-    roots = dynamics.equations.rates(*_mesh_of(dynamics))
+    roots = dynamics.equations.rates(dynamics.mesh_stiffness, dynamics.mesh_damping)
     swing = roots[roots.imag > LEAST_SWING * np.abs(roots).max()]
     swing = swing[np.argsort(np.abs(swing), kind="stable")]
     rate = np.abs(swing)
@@ -132,31 +130,31 @@ def natural_frequencies(dynamics: PairDynamics) -> tuple[Array, Array]:
 class LinearPair(LinearMachine):
     """A gear pair whose mesh is held at its mean stiffness and damping."""
 
-    dynamics: PairDynamics
+    running: RunningPair
 
     def shaft(self, gear: str) -> GearShaft:
         """As ``LinearMachine.shaft``, of the pinion or the wheel."""
         check_choice("gear", gear, SENSE)
-        dynamics, operating, ratio = self.dynamics, self.dynamics.operating, 1.0
+        running, operating, ratio = self.running, self.running.operating, 1.0
         if gear != "pinion":
-            ratio = 1.0 / dynamics.table.pair.ratio
+            ratio = 1.0 / running.table.pair.ratio
         return GearShaft(
             speed=ratio * operating.speed,
             speed_ratio=ratio,
             set_ratio=ratio,
             torque=operating.torque / ratio,
-            mesh_force=dynamics.mesh_force,
+            mesh_force=running.mesh_force,
             sense=SENSE[gear],
             drives=gear == "pinion",
-            body={"pinion": dynamics.pinion, "wheel": dynamics.wheel}[gear],
+            body={"pinion": running.pinion, "wheel": running.wheel}[gear],
         )
 
     def accelerations(
         self, gear: str, frequency: Array, force: Complex, channels: Sequence[str]
     ) -> Complex:
         """As ``LinearMachine.accelerations``, by ``accelerations``."""
-        dofs = self.dynamics.dofs
+        dofs = self.running.dofs
         on_dofs = np.zeros((len(frequency), len(dofs)), dtype=np.complex128)
         on_dofs[:, [dofs.index(f"{gear}_{axis}") for axis in GEAR_AXES]] = force
-        answer = accelerations(self.dynamics, frequency, on_dofs)
+        answer = accelerations(self.running.dynamics, frequency, on_dofs)
         return answer[:, [dofs.index(name) for name in channels]]

@@ -101,6 +101,11 @@ class Operating:
         return all(getattr(self, key) is None for key in COURSES)
 
     @property
+    def has_ripple(self) -> bool:
+        """True where speed or torque has a ripple."""
+        return self.speed_ripple is not None or self.torque_ripple is not None
+
+    @property
     def mean_speed(self) -> float:
         """Mean of the set speed over a record, rad/s."""
         end = self.time_at_set_speed(np.array([self.duration]))
@@ -150,7 +155,7 @@ class Operating:
         """Nominal motion and torque at times in s from the first recorded sample, (time,)."""
         speed, speed_slope = _factor_and_slope(self.speed_profile, times)
         torque, torque_slope = _factor_and_slope(self.torque_profile, times)
-        if self.speed_ripple is not None or self.torque_ripple is not None:
+        if self.has_ripple:
             angle, set_speed = self._set_angle(times), self.speed * speed
             speed, speed_slope = _rippled(
                 self.speed_ripple, speed, speed_slope, times, angle, set_speed

@@ -9,7 +9,7 @@ from gensig.dynamics.response import accelerations
 from gensig.options.compose import compose
 from gensig.papers.paper_figure import Curve, Panel, Paper, PaperFigure
 from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
-from gensig.systems.pair_machine import GearPairMachine, pair_dynamics
+from gensig.systems.pair_machine import GearPairMachine, running_pair
 from gensig.systems.registry import PairParts, helical_pair, read_sliced_pair
 from gensig.systems.run import Run
 from gensig.units import to_si
@@ -63,16 +63,16 @@ def run_up_level(system: GearPairMachine) -> Array:
         specimen=perfect_specimen(*gears),
         gearbox=nominal_gearbox(len(CHANNELS)),
     )
-    dynamics = pair_dynamics(run)
+    running = running_pair(run)
     amplitude = system.flanks.transmission_error().harmonics[:N_ORDERS]
     order, speed = np.arange(1, N_ORDERS + 1), to_si("speed_rpm", 1.0) * SPEEDS_RPM
     frequency = np.outer(speed, order * system.pair.pinion.n_teeth).ravel()
-    push = dynamics.mean_mesh_stiffness * np.tile(amplitude, len(speed))
+    push = running.mean_mesh_stiffness * np.tile(amplitude, len(speed))
     force = np.asarray(
-        push[:, None] * dynamics.approach_direction(), dtype=np.complex128
+        push[:, None] * running.approach_direction(), dtype=np.complex128
     )
-    channels = [dynamics.dofs.index(name) for name in CHANNELS]
-    felt = accelerations(dynamics, frequency, force)[:, channels]
+    channels = [running.dofs.index(name) for name in CHANNELS]
+    felt = accelerations(running.dynamics, frequency, force)[:, channels]
     power = (np.abs(felt) ** 2).reshape(len(speed), -1).sum(axis=1) / 2.0
     return np.asarray(10.0 * np.log10(power))
 

@@ -18,7 +18,7 @@ from gensig.dynamics.integrator import (
     check_machine,
 )
 from gensig.dynamics.mesh_teeth import MeshTeeth
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import SimulationError, StepError
 from gensig.sensing.agreement import agreement
 from gensig.systems.base import Machine
@@ -92,7 +92,7 @@ def checks(
     return errors, verdicts
 
 
-def check_steps(machine: PairDynamics, solver: Solver, sampling_rate: float) -> None:
+def check_steps(machine: Dynamics, solver: Solver, sampling_rate: float) -> None:
     """Raise SimulationError for a machine that none of the steps can follow that are tried.
 
     Without ``max_error`` one length is tried, else also the shorter ones of ``finer``.

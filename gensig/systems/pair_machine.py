@@ -20,7 +20,7 @@ from gensig.dynamics.integrator import (
 )
 from gensig.dynamics.mesh_state import mesh_state
 from gensig.dynamics.mesh_teeth import MeshTeeth
-from gensig.dynamics.pair import PAIR_DOFS, Body, PairDynamics, Rotor
+from gensig.dynamics.pair import PAIR_DOFS, Body, Rotor, RunningPair
 from gensig.dynamics.response import LinearPair
 from gensig.errors import ConfigError, FaultError, GeometryError, SimulationError
 from gensig.faults.base import Fault, faulty_teeth, require_gears
@@ -67,7 +67,7 @@ __all__ = [
     "PairMachine",
     "Run",
     "Start",
-    "pair_dynamics",
+    "running_pair",
     "severity",
     "simulate_together",
 ]
@@ -308,9 +308,7 @@ class GearPairMachine(Machine):
 
     def linear_machine(self, run: Run[Self]) -> LinearPair:
         """The healthy pair in the gearbox of a run."""
-        return LinearPair(
-            dynamics=pair_dynamics(replace(run, faults=(), specimen=None))
-        )
+        return LinearPair(running=running_pair(replace(run, faults=(), specimen=None)))
 
     def check(self) -> None:
         """Raise for errors of every record: drive, fits out of range, channels, step length."""
@@ -320,11 +318,11 @@ class GearPairMachine(Machine):
         sensing, operating = self.sensing, self.operating
         n_channels, rate = len(sensing.channels), sensing.sampling_rate
         check_memory(operating.duration, rate, n_channels, self.solver)
-        nominal = pair_dynamics(Run(system=self, faults=()))
+        nominal = running_pair(Run(system=self, faults=()))
         check_channels(sensing.channels, self.channels)
         sensing.check_gears(self.gears)
         sensing.check(operating.duration)
-        check_steps(nominal, self.solver, rate)
+        check_steps(nominal.dynamics, self.solver, rate)
 
     @classmethod
     def simulate_runs(
@@ -372,14 +370,14 @@ def severity(faults: Sequence[Fault], gears: Mapping[str, Gear]) -> float:
     return value
 
 
-def pair_dynamics(run: PairRun) -> PairDynamics:
-    """Equations of motion of a run with its specimen and gearbox; GeometryError without a drive."""
+def running_pair(run: PairRun) -> RunningPair:
+    """The pair of a run with its specimen and gearbox; GeometryError without a drive."""
     machine, pair = run.system, run.system.pair
     machine.require_drive()
     start = run.start or Start()
     specimen = run.specimen or perfect_specimen(pair.pinion, pair.wheel)
     gearbox = run.gearbox or nominal_gearbox(len(machine.sensing.channels))
-    return PairDynamics(
+    return RunningPair(
         teeth=MeshTeeth(
             table=specimen_table(machine, run.faults, specimen),
             errors=(specimen.pinion_error, specimen.wheel_error),
@@ -398,7 +396,7 @@ def pair_dynamics(run: PairRun) -> PairDynamics:
     )
 
 
-def _kind(run: PairRun, _: PairDynamics) -> tuple[object, ...]:
+def _kind(run: PairRun, _: RunningPair) -> tuple[object, ...]:
     """All values that runs must share to be integrated in one call."""
     system = run.system
     return (
@@ -425,23 +423,23 @@ def simulate_pairs(runs: Sequence[PairRun]) -> list[CleanRecord | SimulationErro
     record.
     """
     return records_by_kind(
-        runs, dynamics_of=_checked_dynamics, kind_of=_kind, integrate=_side_by_side
+        runs, dynamics_of=_checked_pair, kind_of=_kind, integrate=_side_by_side
     )
 
 
-def _checked_dynamics(run: PairRun) -> PairDynamics:
-    dynamics, system = pair_dynamics(run), run.system
-    check_machine(dynamics, system.solver, system.sensing.sampling_rate)
-    return dynamics
+def _checked_pair(run: PairRun) -> RunningPair:
+    running, system = running_pair(run), run.system
+    check_machine(running.dynamics, system.solver, system.sensing.sampling_rate)
+    return running
 
 
 def _side_by_side(
-    runs: Sequence[PairRun], machines: Sequence[PairDynamics]
+    runs: Sequence[PairRun], pairs: Sequence[RunningPair]
 ) -> list[CleanRecord | SimulationError]:
     system = runs[0].system
     rate = system.sensing.sampling_rate
     motions = integrate(
-        machines,
+        [pair.dynamics for pair in pairs],
         system.solver,
         sampling_rate=rate,
         duration=system.operating.duration,
@@ -452,7 +450,7 @@ def _side_by_side(
     records: list[CleanRecord | SimulationError] = []
     for index, run in enumerate(runs):
         if not motions.finite[index]:
-            records.append(not_finite(run, [machines[index].teeth]))
+            records.append(not_finite(run, [pairs[index].teeth]))
             continue
         acceleration, angle = motions.acceleration[index], motions.angle[index][0]
         if run.gearbox is not None:
@@ -460,7 +458,7 @@ def _side_by_side(
         mesh = None
         if run.with_mesh_state:
             faulty = faulty_teeth(run.system.pair, run.faults)
-            mesh = mesh_state(machines[index].teeth, motions.seen[index], angle, faulty)
+            mesh = mesh_state(pairs[index].teeth, motions.seen[index], angle, faulty)
         records.append(
             CleanRecord(
                 acceleration=acceleration,

@@ -6,10 +6,11 @@ import lane_tools
 import numpy as np
 import pytest
 from force_law_example import Stop, StopLaw
-from lane_tools import Changed
 
 from gensig.dynamics.backends.nystroem.method import FORCE_LAWS
 from gensig.dynamics.decimation import in_band_error
+from gensig.dynamics.motion.course import ShaftTorque
+from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.dynamics.pair import PINION_Y, WHEEL_Y
 from gensig.errors import SimulationError
 
@@ -24,17 +25,23 @@ def with_stop(pair, clearance):
     stop = Stop(
         first=PINION_Y, second=WHEEL_Y, clearance=clearance, stiffness=STIFFNESS
     )
-    equations = replace(pair.equations, elements=(stop,))
-    return Changed(pair, equations)
+    return replace(pair, system=replace(pair.system, elements=(stop,)))
 
 
 def with_spring(pair):
     """The pair with a spring in place of a stop that is always pressed by ``PRELOAD``."""
     along = np.zeros(len(pair.dofs))
     along[[PINION_Y, WHEEL_Y]] = 1.0, -1.0
-    stiffness = pair.equations.stiffness + STIFFNESS * np.outer(along, along)
-    equations = replace(pair.equations, stiffness=stiffness)
-    return Changed(pair, equations, -STIFFNESS * PRELOAD * along)
+    stiffness = pair.system.stiffness + STIFFNESS * np.outer(along, along)
+    push = [
+        ShaftTorque(dof=dof, table=np.array([-STIFFNESS * PRELOAD * along[dof]]))
+        for dof in (PINION_Y, WHEEL_Y)
+    ]
+    return replace(
+        pair,
+        system=replace(pair.system, stiffness=stiffness),
+        torques=(*pair.torques, *push),
+    )
 
 
 def motion(*machines, **options):
@@ -50,6 +57,14 @@ def pair(machine, dynamics_of):
 @pytest.fixture(autouse=True)
 def stops(monkeypatch):
     monkeypatch.setitem(FORCE_LAWS, Stop.law, StopLaw())
+
+
+@pytest.fixture(autouse=True)
+def same_start(pair, monkeypatch):
+    """All machines settle from the rest of the pair, and as long."""
+    begin, settling_time = Dynamics.start, pair.settling_time
+    monkeypatch.setattr(Dynamics, "start", lambda _, time: begin(pair, time))
+    monkeypatch.setattr(Dynamics, "settling_time", settling_time)
 
 
 def test_a_stop_that_is_always_pressed_is_a_spring(pair):

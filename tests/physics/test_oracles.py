@@ -37,23 +37,23 @@ class TestFourMilliseconds:
 
     @pytest.fixture(scope="class")
     @classmethod
-    def exact(cls, xiamen, dynamics_of):
+    def exact(cls, xiamen, running_of):
         """Velocities, (sample, dof)."""
-        dynamics = dynamics_of(xiamen, phase=PHASE)
-        slope, _ = equations(dynamics)
+        running = running_of(xiamen, phase=PHASE)
+        slope, _ = equations(running.dynamics)
         times = np.arange(cls.N_SAMPLES + 1) / SAMPLING_RATE
-        states = solved(slope, at_rest(dynamics), times, "DOP853", 1e-11)
+        states = solved(slope, at_rest(running.dynamics), times, "DOP853", 1e-11)
         return states[:, 6:]
 
     @pytest.fixture(scope="class")
     @classmethod
-    def error(cls, xiamen, exact, dynamics_of):
+    def error(cls, xiamen, exact, running_of):
         """Largest relative error of a velocity over degrees of freedom, RMS over the samples."""
-        dynamics = dynamics_of(xiamen, phase=PHASE)
+        running = running_of(xiamen, phase=PHASE)
 
         def measured(velocities, oversampling):
             step = 1 / (SAMPLING_RATE * oversampling)
-            off = velocities(dynamics, step, oversampling, cls.N_SAMPLES) - exact
+            off = velocities(running, step, oversampling, cls.N_SAMPLES) - exact
             lengths = np.linalg.norm(off, axis=0) / np.linalg.norm(exact, axis=0)
             return lengths.max()
 
@@ -74,14 +74,14 @@ class TestFourMilliseconds:
         assert error(velocities_of_the_reference, 64) < 2e-5
 
 
-def velocities_of_the_core(dynamics, step, oversampling, n_samples):
+def velocities_of_the_core(running, step, oversampling, n_samples):
     """Velocities from rest at every sample, (sample, dof)."""
-    group = THREE_PAIRS.pack([dynamics], step, "float64", (0.0, 0.0))
+    group = THREE_PAIRS.pack([running.dynamics], step, "float64", (0.0, 0.0))
     run = GroupRun(
-        fill_lanes([dynamics], "float64"), NO_CHANNELS, "float64", THREE_PAIRS
+        fill_lanes([running.dynamics], "float64"), NO_CHANNELS, "float64", THREE_PAIRS
     )
     for lane in range(run.n_lanes):
-        run.begin(group, lane, *dynamics.start(0.0))
+        run.begin(group, lane, *running.dynamics.start(0.0))
     velocities = [run.state[1, :, 0].copy()]
     for sample in range(n_samples):
         run.advance(group, step, sample * oversampling, oversampling)
@@ -89,11 +89,11 @@ def velocities_of_the_core(dynamics, step, oversampling, n_samples):
     return np.array(velocities)
 
 
-def velocities_of_the_reference(dynamics, step, oversampling, n_samples):
+def velocities_of_the_reference(running, step, oversampling, n_samples):
     """The same by ``benchmarks._classical_scheme``."""
-    start = dynamics.static_start(0.0)
+    start = running.dynamics.static_start(0.0)
     still = np.zeros(len(start))
-    _, v = trajectory(dynamics, start, still, step, n_samples * oversampling)
+    _, v = trajectory(running, start, still, step, n_samples * oversampling)
     return v[::oversampling]
 
 
@@ -142,24 +142,24 @@ CASES = {
 }
 
 
-def periodic_motion(dynamics, period, n_points):
+def periodic_motion(running, period, n_points):
     """States over one period that ends where it began, (n_points + 1, 12): Newton's method on the
     map of the start.
 
     The map's slope is that of the machine with its mesh held at mean stiffness. The drive holds the
     pinion's angle, so that what is periodic turns at the set speed, and the period is known.
     """
-    slope, free = equations(dynamics)
-    direction = dynamics.approach_direction()
-    stiffness = dynamics.mean_mesh_stiffness
-    ratio = dynamics.table.options.damping_ratio
-    damping = 2 * ratio * math.sqrt(stiffness * dynamics.equivalent_mass)
+    slope, free = equations(running.dynamics)
+    direction = running.approach_direction()
+    stiffness = running.mean_mesh_stiffness
+    ratio = running.table.options.damping_ratio
+    damping = 2 * ratio * math.sqrt(stiffness * running.equivalent_mass)
     mesh = np.concatenate([stiffness * direction, damping * direction])
     held = free.copy()
-    held[6:] -= np.outer(direction / dynamics.equations.mass, mesh)
+    held[6:] -= np.outer(direction / running.equations.mass, mesh)
     returns = expm(held * period) - np.eye(12)
 
-    start = at_rest(dynamics)
+    start = at_rest(running.dynamics)
     times = np.linspace(0.0, period, n_points + 1)
     for rtol in (1e-5, 1e-5, 1e-6, 1e-8):
         end = solved(slope, start, times, "LSODA", rtol)[-1]
@@ -175,9 +175,9 @@ class TestPeriodicMotion:
 
     @pytest.fixture(scope="class")
     @classmethod
-    def tile(cls, case, machine, dynamics_of):
-        dynamics = dynamics_of(machine(case.changes), case.faults, phase=PHASE)
-        return periodic_motion(dynamics, case.period, n_points=8192)
+    def tile(cls, case, machine, running_of):
+        running = running_of(machine(case.changes), case.faults, phase=PHASE)
+        return periodic_motion(running, case.period, n_points=8192)
 
     @pytest.fixture
     def default(self, composed_config):

@@ -28,7 +28,7 @@ from gensig.signals.run_up.speed_maps import (
     speed_change,
 )
 from gensig.systems.base import Machine
-from gensig.systems.pair_machine import GearPairMachine, pair_dynamics
+from gensig.systems.pair_machine import GearPairMachine, running_pair
 from gensig.systems.run import Run
 from gensig.terminal.printing import show
 from gensig.text.csv_tables import header_line
@@ -239,7 +239,7 @@ def _modes(machine: Machine) -> list[Mode]:
         frequency, damping = modes.frequency, modes.damping_ratio
     else:
         assert isinstance(machine, GearPairMachine)
-        dynamics = pair_dynamics(Run(system=machine, faults=()))
+        dynamics = running_pair(Run(system=machine, faults=())).dynamics
         frequency, damping = natural_frequencies(dynamics)
     shown = np.flatnonzero((frequency > 0.0) & (damping < MOST_DAMPING))
     return [

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from gensig.driveline.running import RunningLine
 from gensig.driveline.side_by_side.line_mesh_states import line_mesh_state
-from gensig.driveline.time.line_dynamics import LineDynamics
 from gensig.dynamics.backends.base import N_SEEN, Integration, Motions
 from gensig.dynamics.backends.nystroem.machine_lanes import group_kind
 from gensig.dynamics.backends.registry import BACKENDS, EXPLICIT_BACKEND
 from gensig.dynamics.mesh_state import MeshState
+from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import SimulationError
 from gensig.systems.integration_checks import (
     checks,
@@ -155,7 +155,7 @@ def _together(
 
 
 def _mesh_states(
-    run: LineRun, line: LineDynamics, motions: Motions, index: int
+    run: LineRun, line: Dynamics, motions: Motions, index: int
 ) -> list[MeshState]:
     """Loads of the teeth of all meshes in one of some motions."""
     states = []
@@ -167,12 +167,12 @@ def _mesh_states(
 
 
 def _signals(
-    line: LineDynamics, motions: Motions, index: int, dofs: Sequence[int], rate: float
+    line: Dynamics, motions: Motions, index: int, dofs: Sequence[int], rate: float
 ) -> LineSignals:
     """Signals of one of some motions by channel; angles are deviations."""
     angles = motions.angle[index]
     times = np.arange(angles.shape[1]) / rate
-    nominal_angle, nominal_speed = line.course(times)
+    nominal_angle, nominal_speed = line.nominal.over(times)
     rotation = line.system.rotation
     signals: dict[Channel, Array] = {
         ("acceleration", dof): motions.acceleration[index][row]

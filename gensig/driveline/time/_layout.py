@@ -139,8 +139,8 @@ class Torques(NamedTuple):
     factor: Any
 
 
-class Course(NamedTuple):
-    """Nominal rotation.
+class Knots(NamedTuple):
+    """Knots of the nominal rotation.
 
     ``time`` (knot,) s, ``speed`` rad/s, straight between, ``angle`` rad and ``gain`` rad/s2.
     """

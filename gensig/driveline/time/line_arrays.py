@@ -9,10 +9,18 @@ from numpy.typing import NDArray
 
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time import _newmark_kernels as kernels
-from gensig.driveline.time._layout import Factor, Line, Meshes, Padded, Rows, Torques
-from gensig.driveline.time.line_dynamics import LineDynamics
+from gensig.driveline.time._layout import (
+    Factor,
+    Knots,
+    Line,
+    Meshes,
+    Padded,
+    Rows,
+    Torques,
+)
 from gensig.dynamics.equations import A_TURN, B_TURN, Equations, Mesh
 from gensig.dynamics.helical import pitches
+from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import SimulationError
 from gensig.mesh.pair_table import SMOOTHED_GAP, SMOOTHED_SHARE
 from gensig.mesh.tooth_table import ToothTable
@@ -25,7 +33,7 @@ FULL = 0.5
 
 
 def pack_line(
-    line: LineDynamics, order: Index, mass_share: float, damping_share: float, step: str
+    line: Dynamics, order: Index, mass_share: float, damping_share: float, step: str
 ) -> Line:
     """The line with its degrees of freedom in ``order``, and the factor of mass_share M +
     damping_share C + K.
@@ -45,7 +53,7 @@ def pack_line(
     compliance = np.empty((len(direction), len(direction)))
     rows = _rows(direction)
     dynamic = mass_share * mass + damping_share * damping + stiffness
-    factor = _factor(dynamic, [line.names[i] for i in order], step)
+    factor = _factor(dynamic, [line.dofs[i] for i in order], step)
     kernels.respond(factor, rows, answer, compliance)
     rotation = system.rotation[order]
     return Line(
@@ -218,10 +226,18 @@ def _slopes(values: Array, limit: float) -> Array:
     )
 
 
-def pack_torques(line: LineDynamics, order: Index) -> Torques:
+def pack_course(line: Dynamics) -> Knots:
+    """The nominal rotation of a line."""
+    course = line.nominal.with_knots()
+    return Knots(
+        time=course.time, speed=course.speed, angle=course.angle, gain=course.gain
+    )
+
+
+def pack_torques(line: Dynamics, order: Index) -> Torques:
     """All torques at the knots of the nominal rotation, degrees of freedom in ``order``."""
     sources, at_of = line.equations.sources, np.argsort(order)
-    times = line.nominal.time
+    times = line.nominal.with_knots().time
     tables = [source.nodes for source in sources]
     return Torques(
         steady=np.ascontiguousarray(line.forces(times)[:, order]),

@@ -19,15 +19,16 @@ from gensig.driveline.time._layout import Work
 from gensig.driveline.time._scheme import NEWMARK
 from gensig.driveline.time.line_arrays import (
     elimination_order,
+    pack_course,
     pack_line,
     pack_meshes,
     pack_torques,
 )
-from gensig.driveline.time.line_dynamics import LineDynamics
-from gensig.driveline.time.line_statics import OUT_OF_BOUNDS
 from gensig.dynamics.backends.base import N_SEEN
 from gensig.dynamics.decimation import decimator
 from gensig.dynamics.equations import Equations
+from gensig.dynamics.motion.at_rest import OUT_OF_BOUNDS
+from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import ConfigError, SimulationError, StepError
 
 Array = NDArray[np.float64]
@@ -102,7 +103,7 @@ class LineMotion:
 
 
 def integrate_line(
-    line: LineDynamics,
+    line: Dynamics,
     solver: LineSolver,
     *,
     duration: float,
@@ -118,7 +119,7 @@ def integrate_line(
     ----------
     channels : ("angle" | "speed" | "acceleration", degree of freedom) or ("mesh_force", mesh)
     start : deviations and their rates, (dof,) each, where the integration begins; None is
-        ``LineDynamics.static_start``
+        ``Dynamics.static_start``
     with_pairs : whether the state of the pairs of teeth is told at every sample
 
     The low-pass looks ahead and back: integration begins at least ``decimation.Decimator.margin``
@@ -131,7 +132,7 @@ def integrate_line(
         step passes a tooth
     SimulationError    where the motion leaves all bounds
     """
-    n = len(line.names)
+    n = len(line.dofs)
     _check_channels(line, channels)
     n_samples = round(duration * solver.sampling_rate)
     if n_samples < 1 or not 0.0 <= lead_in < math.inf:
@@ -155,7 +156,7 @@ def integrate_line(
     run.begin(first_sample * solver.oversampling)
     run.skip((-low_pass.margin - first_sample) * solver.oversampling - 1)
     signals = run.record(n_samples)
-    angle, speed = line.nominal.nominal(np.arange(n_samples) / solver.sampling_rate)
+    angle, speed = line.nominal.over(np.arange(n_samples) / solver.sampling_rate)
     motion = run.motion(signals, angle, speed)
     _check_balance(motion.energy_residual, solver)
     return motion
@@ -181,12 +182,12 @@ class _Run:
 
     def __init__(
         self,
-        line: LineDynamics,
+        line: Dynamics,
         solver: LineSolver,
         start: tuple[Array, Array],
         channels: Sequence[tuple[str, int]],
     ) -> None:
-        self.line, self.course, self.solver = line, line.nominal.knots, solver
+        self.line, self.course, self.solver = line, pack_course(line), solver
         self.channels = tuple(channels)
         self.order = elimination_order(line.system)
         n_meshes = len(line.system.meshes)
@@ -251,7 +252,7 @@ class _Run:
         self.step_index += n_steps
         self.n_steps += n_steps
         if not max(np.abs(q).max(), np.abs(v).max()) < OUT_OF_BOUNDS:
-            worst = self.line.names[
+            worst = self.line.dofs[
                 self.order[int(np.argmax(np.maximum(np.abs(q), np.abs(v))))]
             ]
             raise SimulationError(
@@ -333,11 +334,11 @@ def _scratch(system: Equations) -> Work:
     )
 
 
-def _check_channels(line: LineDynamics, channels: Sequence[tuple[str, int]]) -> None:
+def _check_channels(line: Dynamics, channels: Sequence[tuple[str, int]]) -> None:
     if not channels:
         raise ConfigError("line: no channel to give out; name at least one")
     for kind, i in channels:
-        n = len(line.names)
+        n = len(line.dofs)
         if kind == "mesh_force":
             n = len(line.system.meshes)
         if kind not in KINDS or not 0 <= i < n:
@@ -346,11 +347,11 @@ def _check_channels(line: LineDynamics, channels: Sequence[tuple[str, int]]) -> 
             )
 
 
-def _check_step(line: LineDynamics, step: float) -> None:
+def _check_step(line: Dynamics, step: float) -> None:
     for mesh in line.system.meshes:
         turning = abs(float(line.system.rotation[mesh.turn]))
         pitches_per_rad = mesh.teeth.pair.pinion.n_teeth * turning / (2.0 * math.pi)
-        rate = pitches_per_rad * line.nominal.speed.max()
+        rate = pitches_per_rad * line.nominal.with_knots().speed.max()
         if rate * step > LONGEST_STEP:
             raise StepError(
                 f"mesh '{mesh.name}' rolls {rate * step:.2g} pitches in a step, its "

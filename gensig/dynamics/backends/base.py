@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gensig.dynamics._layout import MOST_PAIRS as MOST_PAIRS
 from gensig.dynamics._layout import N_SEEN as N_SEEN
 from gensig.dynamics._layout import SEEN_FORCE as SEEN_FORCE
-from gensig.dynamics.equations import Dynamics
+from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import ConfigError
 
 Array = NDArray[np.float64]

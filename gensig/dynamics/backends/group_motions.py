@@ -16,8 +16,8 @@ from gensig.dynamics.backends.base import OUT_OF_BOUNDS, Integration, Motions
 from gensig.dynamics.backends.group_run import Core, GroupRun
 from gensig.dynamics.backends.step_limits import FINE_TIME, SETTLING_STEPS
 from gensig.dynamics.decimation import decimator
-from gensig.dynamics.equations import Dynamics
 from gensig.dynamics.lanes import at_step, fill_lanes
+from gensig.dynamics.motion.dynamics import Dynamics
 
 Array = NDArray[np.float64]
 

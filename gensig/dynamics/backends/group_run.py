@@ -15,7 +15,7 @@ from gensig.dynamics._layout import CENTER, N_SEEN
 from gensig.dynamics._record_kernels import LOW_PASS_PRECISION
 from gensig.dynamics._vector import aligned, n_lanes
 from gensig.dynamics.decimation import Decimator
-from gensig.dynamics.equations import Dynamics
+from gensig.dynamics.motion.dynamics import Dynamics
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import warnings
 
 import numpy as np
 
-from gensig.dynamics.equations import Dynamics
+from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import StepError
 
 FASTEST_GEARS = 1e6  # Hz, above which sizes are wrong rather than steps too long

@@ -11,7 +11,7 @@ import yaml
 from numpy.typing import NDArray
 
 from gensig.dynamics.mesh_teeth import MeshTeeth
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.pair import RunningPair
 from gensig.errors import ConfigError
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.faults.registry import read_faults
@@ -176,10 +176,10 @@ def with_words(case: Case, *words: str) -> Case:
     return read_case((*case.overrides, *words))
 
 
-def pair_dynamics(case: Case) -> PairDynamics:
+def running_pair(case: Case) -> RunningPair:
     """The equations of motion with perfect teeth."""
     system = case.system
-    return PairDynamics(
+    return RunningPair(
         teeth=MeshTeeth.perfect(case.table),
         pinion=system.pinion,
         wheel=system.wheel,

@@ -21,7 +21,7 @@ from gensig.dynamics.backends.nystroem import machine_lanes
 from gensig.dynamics.decimation import in_band_error
 from gensig.faults.broken import MissingTooth
 from gensig.plan.request import read_request
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import running_pair
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run, Start
 
@@ -69,9 +69,9 @@ def test_a_pair_with_chords_as_a_line_moves_as_the_pair(faults, words):
     system = read_system(read_request([*words]).config)
     start = Start(tooth_pinion=3, tooth_wheel=5, phase=0.3)
     run = Run(system=system, faults=faults, start=start, specimen=specimen_of(system))
-    pair = pair_dynamics(run)
+    pair = running_pair(run)
     assert len(pair.table.depth) > 4
-    assert_moves_as_a_line(pair, oversampling=12)  # tilts are stiff
+    assert_moves_as_a_line(pair.dynamics, oversampling=12)  # tilts are stiff
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 from chord_tables import Slices, as_chords, repeated, with_table
 from closeness import assert_close
 from lane_tools import advance
-from line_tools import law_at, pair_line, state_after, turning_mesh
+from line_tools import law_at, state_after, turning_mesh
 
 from gensig.driveline.time import _layout as layout
 from gensig.dynamics.mesh_teeth import MeshTeeth
@@ -161,11 +161,8 @@ class TestZeroHelix:
                 )
 
 
-def moved(line, dynamics):
-    start = (
-        dynamics.static_start(0.0),
-        np.zeros(len(line.names)),
-    )
+def moved(line):
+    start = line.static_start(0.0), np.zeros(len(line.dofs))
     n_steps = STEPS * N_SAMPLES
     return state_after(
         line,
@@ -180,7 +177,7 @@ class TestAgainstThePair:
 
     @pytest.fixture(scope="class", params=["sound", "missing tooth"])
     @classmethod
-    def dynamics(cls, request, machine, dynamics_of):
+    def running(cls, request, machine, running_of):
         spur = machine({"mesh.points_per_pitch": 2048})
         table = Slices(spur, HELIX).table(DEPTH)
         if request.param == "missing tooth":
@@ -197,22 +194,22 @@ class TestAgainstThePair:
             "pinion_error": rng.normal(0, 2e-6, 23),
             "wheel_error": rng.normal(0, 2e-6, 84),
         }
-        return with_table(dynamics_of(spur, (), **errors), table)
+        return with_table(running_of(spur, (), **errors), table)
 
-    def test_the_same_motion(self, dynamics):
-        q_1, v_1, motion = moved(pair_line(dynamics), dynamics)
+    def test_the_same_motion(self, running):
+        q_1, v_1, motion = moved(running.dynamics)
         start = (
-            dynamics.static_start(0.0),
-            np.zeros(len(dynamics.dofs)),
+            running.dynamics.static_start(0.0),
+            np.zeros(len(running.dofs)),
         )
         q, v, _ = advance(
-            dynamics,
+            running,
             *start,
             1 / (51200 * STEPS),
             0,
             STEPS * N_SAMPLES,
         )
-        direction = dynamics.approach_direction()
+        direction = running.approach_direction()
 
         assert motion.energy_residual < 1e-4
         assert_close(

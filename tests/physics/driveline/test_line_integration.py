@@ -18,9 +18,9 @@ from line_tools import (
 )
 from scipy.linalg import eigh, expm
 
-from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
 from gensig.driveline.time.newmark import integrate_line
 from gensig.dynamics.decimation import decimator
+from gensig.dynamics.motion.course import LineCourse, ShaftTorque, constant_speed
 
 SPEED = 100.0  # rad/s
 

@@ -14,7 +14,6 @@ from line_tools import (
     STIFFNESS,
     constant_torques,
     order_of,
-    pair_line,
     state_after,
     steps,
     two_gears,
@@ -22,9 +21,8 @@ from line_tools import (
 from scipy.integrate import solve_ivp
 
 from benchmarks._engine_line import engine_line, engine_torques
-from gensig.driveline.time.course import constant_speed
 from gensig.driveline.time.newmark import integrate_line
-from gensig.dynamics.pair import PINION_ROTATION
+from gensig.dynamics.motion.course import constant_speed
 from gensig.faults.broken import MissingTooth
 
 
@@ -153,7 +151,7 @@ class TestAgainstThePair:
         params=[(), (MissingTooth(gear="pinion", tooth=2),)],
     )
     @classmethod
-    def dynamics(cls, request, machine, dynamics_of):
+    def running(cls, request, machine, running_of):
         rng = np.random.default_rng(1)
         faults = request.param
         pair = machine({"mesh.points_per_pitch": 2048})
@@ -163,38 +161,20 @@ class TestAgainstThePair:
             "pinion_tilt": rng.normal(0, 3e-4, 23),
             "wheel_tilt": rng.normal(0, 3e-4, 84),
         }
-        return dynamics_of(pair, faults, **errors)
+        return running_of(pair, faults, **errors)
 
-    @pytest.fixture(scope="class")
-    @classmethod
-    def line(cls, dynamics):
-        return pair_line(dynamics)
-
-    def test_the_same_motion(self, dynamics, line):
-        start = (dynamics.static_start(0.0), np.zeros(6))
+    def test_the_same_motion(self, running):
+        start = (running.dynamics.static_start(0.0), np.zeros(6))
         n_steps = self.STEPS * self.N_SAMPLES
         step = 1 / (51200 * self.STEPS)
-        q, v, _ = advance(dynamics, *start, step, 0, n_steps)
-        q_1, v_1, motion = state_after(line, start, n_steps * step, n_steps)
-        direction = dynamics.approach_direction()
+        q, v, _ = advance(running, *start, step, 0, n_steps)
+        q_1, v_1, motion = state_after(running.dynamics, start, n_steps * step, n_steps)
+        direction = running.approach_direction()
         scale = np.abs(v).max()
 
         assert_close(v_1, v, atol=2e-4 * scale)
         assert_close(q_1 @ direction, q @ direction, atol=2e-8)
         assert motion.energy_residual < 1e-4
-
-    def test_the_same_rest(self, dynamics, line):
-        """Statics leave out friction, and what makes up for it."""
-        torques = dynamics.set_force.copy()
-        torques[PINION_ROTATION] -= dynamics.friction_torque()
-        loaded = replace(line, torques=constant_torques(torques))
-        computed = loaded.static_start(0.0)
-        expected = dynamics.static_start(0.0)
-        assert_close(
-            computed,
-            expected,
-            atol=1e-6 * np.abs(expected).max(),
-        )
 
 
 class TestLowRank:
@@ -222,8 +202,8 @@ class TestLowRank:
         """A gear train without backlash is linear."""
         rng = np.random.default_rng(2)
         start = (
-            rng.normal(0, 1e-4, len(engine.names)),
-            rng.normal(0, 0.1, len(engine.names)),
+            rng.normal(0, 1e-4, len(engine.dofs)),
+            rng.normal(0, 0.1, len(engine.dofs)),
         )
         n_steps = 4000
         duration = 0.04

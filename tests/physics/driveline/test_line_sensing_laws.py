@@ -14,8 +14,8 @@ from line_tools import IMPLICIT
 from gensig.driveline.line_gears import gear_dof
 from gensig.driveline.mesh_phase import start_phases
 from gensig.driveline.running import Governor, running_line, steady_course
-from gensig.driveline.time.course import LineCourse, ShaftTorque
 from gensig.driveline.time.newmark import LineSolver
+from gensig.dynamics.motion.course import LineCourse, ShaftTorque
 from gensig.dynamics.response import GEAR_AXES
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
@@ -43,7 +43,7 @@ def unfiltered(system):
 def rolls(line, time=0.0):
     """Pitches that every mesh has rolled at a time, (mesh,)."""
     system = line.dynamics.system
-    angle = float(line.dynamics.course(np.array([time]))[0][0])
+    angle = line.dynamics.nominal.at(time).angle
     return np.array(
         [
             mesh.teeth.start_phase

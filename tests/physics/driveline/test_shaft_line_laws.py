@@ -297,21 +297,21 @@ def test_stiff_supports_leave_the_torsional_line(lines):
 
 
 @pytest.mark.parametrize("rotors", [{}, ROTORS], ids=["pair", "with_rotors"])
-def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, rotors):
+def test_the_single_pair_is_the_same_code_with_two_nodes(machine, running_of, rotors):
     """Matrices of the line are those of the pair without its soft drive."""
     system = machine(rotors)
-    dynamics = dynamics_of(system)
-    pair_system = dynamics.equations
+    running = running_of(system)
+    pair_system = running.equations
     matrices = drive_line_of_pair(system, "pair").matrices()
     order = []
     for name in matrices.names:
         gear, _, axis = name.partition(" ")
-        order.append(dynamics.dofs.index(f"{gear}_{axis or 'rotation'}"))
+        order.append(running.dofs.index(f"{gear}_{axis or 'rotation'}"))
     both = np.ix_(order, order)
-    driver = dynamics.dofs.index("motor_rotation" if rotors else "pinion_rotation")
+    driver = running.dofs.index("motor_rotation" if rotors else "pinion_rotation")
 
     stiffness = pair_system.governed_stiffness.copy()
-    stiffness[driver, driver] -= dynamics.drive_stiffness
+    stiffness[driver, driver] -= running.drive_stiffness
 
     assert_close(np.diag(matrices.mass), pair_system.mass[order], 1e-14)
     assert_close(
@@ -325,12 +325,12 @@ def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, r
     damping[order.index(driver), order.index(driver)] = 0.0
     assert_close(damping, 0.0, atol=1e-12 * pair_system.governed_damping.max())
 
-    direction = dynamics.approach_direction()
+    direction = running.approach_direction()
     assert_close(
         matrices.directions[0],
         direction[order],
         1e-12,
         atol=1e-15,
     )
-    assert matrices.mesh_stiffness == [dynamics.mean_mesh_stiffness]
-    assert matrices.mesh_damping == [dynamics.mesh_damping]
+    assert matrices.mesh_stiffness == [running.mean_mesh_stiffness]
+    assert matrices.mesh_damping == [running.mesh_damping]

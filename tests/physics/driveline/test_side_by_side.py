@@ -26,7 +26,7 @@ from gensig.plan.request import read_request
 from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_record
 from gensig.systems.base import simulate_together
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import running_pair
 from gensig.systems.run import Start
 
 QUICK = {
@@ -66,21 +66,21 @@ BOXES = {"spur": TWO_STAGE, "helical": HELICAL}
     [({}, (one("crack", tooth=4),)), ({}, MISSING), (BOUNCING, MISSING)],
     ids=["crack", "missing", "bouncing"],
 )
-def test_a_pair_as_a_line_moves_as_the_pair(machine, dynamics_of, changes, faults):
+def test_a_pair_as_a_line_moves_as_the_pair(machine, running_of, changes, faults):
     """Other loops, the same law: friction, back flanks, kinks and the start of teeth agree."""
     errors = np.random.default_rng(3).normal(0.0, 2e-6, (2, 84))
     teeth = {"pinion_error": errors[0, :23], "wheel_error": errors[1]}
-    pair = dynamics_of(machine({**QUICK, **changes}), faults, **teeth)
-    assert_moves_as_a_line(pair)
+    pair = running_of(machine({**QUICK, **changes}), faults, **teeth)
+    assert_moves_as_a_line(pair.dynamics)
 
 
 def test_a_pair_with_errors_of_manufacture_moves_as_the_pair(machine):
     """Runout, pitch errors and profile slopes that differ from tooth to tooth."""
     system = machine({**QUICK, "quality.iso1328_grade": 6})
     run = run_of(system, specimen=specimen_of(system))
-    pair = pair_dynamics(run)
+    pair = running_pair(run)
     assert np.ptp(pair.teeth.tilts[0]) > 1e-5
-    assert_moves_as_a_line(pair)
+    assert_moves_as_a_line(pair.dynamics)
 
 
 @pytest.fixture(scope="module")

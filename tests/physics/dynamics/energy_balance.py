@@ -26,36 +26,37 @@ class Balance(NamedTuple):
         return np.abs(imbalance).max() / self.stored.max()
 
 
-def balance(dynamics, step, n_steps):
+def balance(running, step, n_steps):
     """Balance of a motion from static equilibrium."""
-    start = dynamics.static_start(0.0)
+    start = running.dynamics.static_start(0.0)
     q, v = trajectory(
-        dynamics,
+        running,
         start,
         np.zeros(len(start)),
         step,
         n_steps,
     )
     motions = motion_of(
-        dynamics,
+        running,
         step * np.arange(len(q)),
         q,
         v,
     )
-    law = laws(dynamics, motions, step)
+    law = laws(running, motions, step)
     _, friction, moment_p, moment_w, _, stored, lost, _ = law.T
-    system = dynamics.equations
+    system = running.equations
     turning = np.isin(np.arange(len(start)), (2, 5))
     k = np.diag(system.governed_stiffness)
     c = np.diag(system.governed_damping)
-    speeds = v + dynamics.operating.speed * system.rotation
+    speeds = v + running.operating.speed * system.rotation
     kinetic = 0.5 * speeds**2 @ system.mass
     elastic = 0.5 * q**2 @ np.where(turning, 0.0, k)
-    drive = dynamics.set_force[2] - k[2] * q[:, 2] - c[2] * v[:, 2]
+    drive = running.dynamics.forces(np.zeros(1))[0][2] - k[2] * q[:, 2] - c[2] * v[:, 2]
     moments = moment_p * speeds[:, 2] + moment_w * speeds[:, 5]
     return Balance(
         energy=kinetic + elastic + stored,
-        supplied=drive * speeds[:, 2] + dynamics.set_force[5] * speeds[:, 5],
+        supplied=drive * speeds[:, 2]
+        + running.dynamics.forces(np.zeros(1))[0][5] * speeds[:, 5],
         supports=v**2 @ np.where(turning, 0.0, c),
         mesh_damping=lost,
         friction=friction * (v[:, 0] - v[:, 3]) + moments,

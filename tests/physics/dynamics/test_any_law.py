@@ -12,7 +12,7 @@ from gensig.dynamics.decimation import in_band_error
 from gensig.dynamics.integrator import Solver
 from gensig.faults.broken import MissingTooth
 from gensig.plan.request import read_request
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import running_pair
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run
 
@@ -102,7 +102,9 @@ class TestHelicalPairs:
                 "operating.drive_frequency_hz=20",
             ]
             config = read_request(["experiment=helical", *words]).config
-            made.append(pair_dynamics(Run(system=read_system(config), faults=faults)))
+            made.append(
+                running_pair(Run(system=read_system(config), faults=faults)).dynamics
+            )
         return made
 
     @pytest.fixture(scope="class")
@@ -132,9 +134,9 @@ class TestHelicalPairs:
         for machine, seen, other in zip(pairs, found.seen, exact.seen, strict=True):
             same = seen[0] == other[0]  # a pair enters a sample earlier or later
             assert same.mean() > 0.98
-            off = np.abs(seen[1:] - other[1:])[:, same] / machine.mesh_force
+            off = np.abs(seen[1:] - other[1:])[:, same] / machine.reference_force[0]
             assert np.sqrt((off**2).mean()) < 2e-3
-            assert np.abs(other[1:]).max() > 0.3 * machine.mesh_force
+            assert np.abs(other[1:]).max() > 0.3 * machine.reference_force[0]
 
 
 class TestPapersLaw:

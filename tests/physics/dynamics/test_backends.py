@@ -72,7 +72,7 @@ def motion(machine, integration):
     states = solved(slope, start, np.append(begin, times), "LSODA", 1e-7)[1:]
     dofs = [machine.dofs.index(name) + 6 for name in integration.channels]
     means = np.diff(states[:, dofs], axis=0) * rate * factor
-    angle = machine.operating.speed * times + states[:, 2]
+    angle = machine.nominal.at(0.0).speed * times + states[:, 2]
     recorded = angle[margin * factor + 1 :: factor][: integration.n_samples + 1]
     return low_pass.apply_to_columns(means).T, recorded
 

@@ -22,9 +22,9 @@ FAULTS = {
 
 
 @pytest.fixture(scope="module", params=FAULTS)
-def faulty(request, machine, dynamics_of):
+def faulty(request, machine, running_of):
     return {
-        law: dynamics_of(
+        law: running_of(
             machine({"mesh.roll_torque": law}),
             FAULTS[request.param],
         )
@@ -34,7 +34,7 @@ def faulty(request, machine, dynamics_of):
 
 @pytest.fixture(scope="module")
 def case(faulty):
-    return {law: balance(dynamics, STEP, N_STEPS) for law, dynamics in faulty.items()}
+    return {law: balance(running, STEP, N_STEPS) for law, running in faulty.items()}
 
 
 def test_power_is_stored_and_dissipated(case):
@@ -53,6 +53,6 @@ def test_damping_and_friction_dissipate(case):
         assert motion.friction.max() < 0.05 * -motion.friction.mean()
 
 
-def test_coarse_tables_balance_too(machine, dynamics_of):
-    coarse = dynamics_of(machine({"mesh.points_per_pitch": 128}))
+def test_coarse_tables_balance_too(machine, running_of):
+    coarse = running_of(machine({"mesh.points_per_pitch": 128}))
     assert balance(coarse, STEP, N_STEPS).residual < 2e-4

@@ -37,8 +37,8 @@ def slices(xiamen):
 
 
 @pytest.fixture(scope="module")
-def spur(xiamen, dynamics_of):
-    return dynamics_of(xiamen)
+def spur(xiamen, running_of):
+    return running_of(xiamen)
 
 
 @pytest.fixture(scope="module")
@@ -46,11 +46,11 @@ def helical(spur, slices):
     return with_table(spur, slices.table(DEPTH))
 
 
-def moved(dynamics, n_steps, step=STEP):
+def moved(running, n_steps, step=STEP):
     """States from static equilibrium on, q and v."""
-    start = dynamics.static_start(0.0)
+    start = running.dynamics.static_start(0.0)
     return trajectory(
-        dynamics,
+        running,
         start,
         np.zeros(len(start)),
         step,
@@ -63,8 +63,8 @@ class TestZeroHelix:
 
     @pytest.mark.parametrize("n_chords", [1, 3])
     @pytest.mark.parametrize("faults", [(), (MissingTooth(gear="pinion", tooth=1),)])
-    def test_the_motion_in_the_plane(self, xiamen, dynamics_of, n_chords, faults):
-        spur = dynamics_of(xiamen, faults)
+    def test_the_motion_in_the_plane(self, xiamen, running_of, n_chords, faults):
+        spur = running_of(xiamen, faults)
         chords = with_table(spur, as_chords(spur.table, n_chords))
         assert chords.dofs == (*PAIR_DOFS, *AXIAL_DOFS)
 
@@ -102,9 +102,9 @@ class TestZeroHelix:
         )
 
 
-def contact(dynamics):
+def contact(running):
     """Pitch point from the centres of both gears, and the push on the wheel, in x, y, z."""
-    pair = dynamics.table.pair
+    pair = running.table.pair
     radii = pair.pinion.base_radius, -pair.wheel.base_radius
     across = math.tan(pair.working_pressure_angle)
     hand = math.copysign(1.0, pair.pinion.helix_angle)
@@ -145,11 +145,11 @@ class TestForces:
         table = replace(gears.table, options=options)
         still = with_teeth(gears, table=table)
         system = still.equations
-        start = gears.static_start(0.0)
+        start = gears.dynamics.static_start(0.0)
         acceleration = right_hand_side(still, 0.0, start, np.zeros(12))
         force = (
             system.mass * acceleration
-            - still.set_force
+            - still.dynamics.forces(np.zeros(1))[0]
             + system.governed_stiffness @ start
         )
         at_pinion, at_wheel, push = contact(gears)
@@ -185,7 +185,7 @@ class TestForces:
 
     def test_the_thrust_of_a_driver_follows_its_hand(self, gears, hand):
         """Fingers of the hand of the helix along the rotation: the thumb is the thrust."""
-        start = gears.static_start(0.0)
+        start = gears.dynamics.static_start(0.0)
         assert math.copysign(1.0, start[6]) == -hand
 
         thrust = start[6] * gears.pinion.support.stiffness_z
@@ -305,7 +305,7 @@ class TestRecords:
         with_mesh_state=False,
     ):
         return integrate(
-            machines,
+            [each.dynamics for each in machines],
             Solver(
                 oversampling=8,
                 precision=precision,

@@ -9,7 +9,7 @@ from scipy.signal import decimate
 
 from gensig.faults.broken import MissingTooth
 from gensig.plan.request import read_request
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import running_pair
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run, Start
 
@@ -35,15 +35,15 @@ def level(prescribed, by_stiffness):
     system = read_system(read_request([*PAPERS]).config)
     missing = MissingTooth(gear="pinion", tooth=3)
     start = Start(tooth_pinion=3, tooth_wheel=5, phase=0.3)
-    dynamics = pair_dynamics(Run(system=system, faults=(missing,), start=start))
-    ratio = dynamics.mesh_damping / dynamics.mean_mesh_stiffness
+    running = running_pair(Run(system=system, faults=(missing,), start=start))
+    ratio = running.mesh_damping / running.mean_mesh_stiffness
     slope, _ = equations(
-        dynamics,
+        running.dynamics,
         prescribed=prescribed,
         damped_by_stiffness=ratio if by_stiffness else None,
     )
     times = np.arange(int(DURATION * RATE * PER_SAMPLE)) / (RATE * PER_SAMPLE)
-    states = solved(slope, at_rest(dynamics), times, "RK45", 1e-6)
+    states = solved(slope, at_rest(running.dynamics), times, "RK45", 1e-6)
     gained = [slope(t, y)[PINION_Y_SPEED] for t, y in zip(times, states, strict=True)]
     signal = decimate(np.array(gained), PER_SAMPLE, ftype="fir")
     return signal[int(SETTLING * RATE) :].std()

@@ -8,7 +8,7 @@ from lane_tools import law_of, on_any_bodies
 from numpy.testing import assert_allclose
 
 from gensig.driveline.side_by_side.line_records import running_line_of
-from gensig.driveline.time.line_statics import line_at_rest
+from gensig.dynamics.motion.at_rest import at_rest as found_at_rest
 from gensig.operation.options import read_operating
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
@@ -37,7 +37,7 @@ def line(request):
 def at_rest(dynamics, system, force):
     """The deflection of the line, or one like it, under forces at time 0."""
     mean, scale = dynamics.reference_force, dynamics.mesh_stiffness
-    return line_at_rest(system, mean, scale, 0.0, force)
+    return found_at_rest(system, mean, scale, 0.0, force)
 
 
 def test_the_teeth_carry_what_the_springs_do_not(line):
@@ -53,7 +53,7 @@ def test_the_teeth_carry_what_the_springs_do_not(line):
         teeth = mesh.teeth
         radius = teeth.pair.pinion.base_radius
         roll = teeth.start_roll + radius * still[mesh.turn]
-        law = law_of(on_any_bodies(teeth, usual, operating))
+        law = law_of(on_any_bodies(teeth, usual, operating).dynamics)
         found = law(roll, mesh.approach(still), 0.0, 0.0)[0]
         assert_allclose(found, load, rtol=1e-4)
         assert load > 0.5 * usual

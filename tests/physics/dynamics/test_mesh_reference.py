@@ -65,15 +65,15 @@ def tooth_at(values, index):
 class Reference:
     """Six equations of a pair, as the theory writes them; one-sided law."""
 
-    def __init__(self, dynamics):
-        self.d = dynamics
-        self.table = dynamics.table
-        self.pair = dynamics.table.pair
-        self.system = dynamics.equations
+    def __init__(self, running):
+        self.d = running
+        self.table = running.table
+        self.pair = running.table.pair
+        self.system = running.equations
         self.shared = self.table.shared_compliance
-        self.damping = mesh_numbers(dynamics.equations.meshes[0], dynamics.rest, 1e-6)[
-            DAMPING
-        ]
+        self.damping = mesh_numbers(
+            running.equations.meshes[0], running.dynamics.rest, 1e-6
+        )[DAMPING]
 
     def present(self, index):
         """Pairs whose teeth exist, (pair,)."""
@@ -201,27 +201,30 @@ class Reference:
         system = self.system
         turning = moment_p + self.pair.pinion.base_radius * along
         force = np.array([friction, 0, turning, -friction, 0, moment_w])
-        force += self.d.set_force - normal * self.d.approach_direction()
+        force += (
+            self.d.dynamics.forces(np.zeros(1))[0]
+            - normal * self.d.approach_direction()
+        )
         force -= system.governed_stiffness @ q + system.governed_damping @ v
         return force / system.mass
 
 
 @pytest.fixture(scope="module", params=FAULTS)
-def dynamics(request, xiamen, dynamics_of):
+def running(request, xiamen, running_of):
     rng = np.random.default_rng(5)
     errors = {
         f"{gear}_{key}": rng.normal(0, scatter, n)
         for key, scatter in (("error", 2e-6), ("tilt", 3e-4))
         for gear, n in (("pinion", 23), ("wheel", 84))
     }
-    return dynamics_of(xiamen, FAULTS[request.param], **errors)
+    return running_of(xiamen, FAULTS[request.param], **errors)
 
 
-def random_states(dynamics, n, seed):
+def random_states(running, n, seed):
     """Roll, approach, its rate and the rate of the roll, (n, 4)."""
     rng = np.random.default_rng(seed)
-    pair = dynamics.table.pair
-    speed = dynamics.operating.speed * pair.pinion.base_radius
+    pair = running.table.pair
+    speed = running.operating.speed * pair.pinion.base_radius
     roll = rng.uniform(0, 8, n) * pair.base_pitch
     approach = rng.uniform(-2e-6, 40e-6, n)
     rates = (
@@ -231,29 +234,29 @@ def random_states(dynamics, n, seed):
     return np.column_stack([roll, approach, *rates])
 
 
-def test_the_mesh_law_agrees(dynamics):
-    reference = Reference(dynamics)
-    states = random_states(dynamics, 300, seed=7)
+def test_the_mesh_law_agrees(running):
+    reference = Reference(running)
+    states = random_states(running, 300, seed=7)
     expected = np.array([reference.mesh(*state) for state in states])
     scale = SCALE * np.maximum(1.0, expected[:, :1])
-    law = laws(dynamics, states)[:, :7]
+    law = laws(running, states)[:, :7]
 
     assert_close(law / scale, expected / scale, 1e-9, atol=1e-9)
     assert (expected[:, 0] > 0).sum() > 200
 
 
-def test_back_flanks_agree(dynamics):
+def test_back_flanks_agree(running):
     """Between half the backlash and the back flanks nothing touches."""
-    reference = Reference(dynamics)
-    states = random_states(dynamics, 300, seed=17)
+    reference = Reference(running)
+    states = random_states(running, 300, seed=17)
     rng = np.random.default_rng(1)
-    backlash = dynamics.table.pair.backlash
+    backlash = running.table.pair.backlash
     states[:, 1] = -backlash - rng.uniform(0, 40e-6, 300)
     expected = np.array([reference.coast(*state) for state in states])
     scale = np.append(SCALE, 1) * np.maximum(1.0, -expected[:, :1])
 
     assert_close(
-        laws(dynamics, states) / scale,
+        laws(running, states) / scale,
         expected / scale,
         1e-9,
         atol=1e-9,
@@ -261,26 +264,26 @@ def test_back_flanks_agree(dynamics):
     assert (expected[:, 7] == -2).sum() > 50
 
     states[:, 1] = -backlash * rng.uniform(0.5, 1.0, 300)
-    assert np.all(laws(dynamics, states) == 0.0)
+    assert np.all(laws(running, states) == 0.0)
 
 
-def test_the_right_hand_side_agrees(dynamics):
-    reference = Reference(dynamics)
+def test_the_right_hand_side_agrees(running):
+    reference = Reference(running)
     rng = np.random.default_rng(11)
     size = np.array([1, 1, 20, 1, 1, 20])
     for time in rng.integers(0, 40_000, 40) * 1e-7:
-        q = dynamics.static_start(time) + rng.normal(0, 1e-6, 6) * size
+        q = running.dynamics.static_start(time) + rng.normal(0, 1e-6, 6) * size
         v = rng.normal(0, 1e-2, 6) * size
         expected = reference.acceleration(time, q, v)
         # the slope in the middle of so brief a step is the difference of its two ends
         tolerance = 1e-6 * np.abs(expected).max()
-        acceleration = right_hand_side(dynamics, time, q, v)
+        acceleration = right_hand_side(running, time, q, v)
         assert_close(acceleration, expected, 1e-9, atol=tolerance)
 
 
-def test_a_tooth_that_stands_proud_carries_up_to_its_gap(xiamen, dynamics_of):
+def test_a_tooth_that_stands_proud_carries_up_to_its_gap(xiamen, running_of):
     """The force fades out where the flanks part, even beyond half the backlash."""
-    eccentric = dynamics_of(xiamen, (one("runout", tooth=0, eccentricity_um=80),))
+    eccentric = running_of(xiamen, (one("runout", tooth=0, eccentricity_um=80),))
     speed = eccentric.operating.speed * eccentric.table.pair.pinion.base_radius
     pitch, step = eccentric.table.pair.base_pitch, 0.05e-6
     parting = 0

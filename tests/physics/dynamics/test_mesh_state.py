@@ -13,7 +13,7 @@ from gensig.faults.broken import MissingTooth
 from gensig.mesh.pair_table import N_PAIRS
 from gensig.sensing.chain import detectability
 from gensig.systems.base import simulate_together
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import running_pair
 from gensig.systems.run import Run
 
 RATE = 51200.0
@@ -80,11 +80,11 @@ def test_teeth_follow_one_another_and_keep_their_row(mesh):
 def test_slow_gears_have_the_static_shares(run, record):
     slow = {SPEED: 60, DURATION: 0.05}
     result = record(slow)
-    dynamics = pair_dynamics(run(slow))
-    radius = dynamics.table.pair.pinion.base_radius
-    roll = dynamics.teeth.start_roll + radius * result.shaft_angle
-    load = dynamics.teeth.static(dynamics.teeth.states(roll), dynamics.mesh_force).load
-    expected = np.sort(load / dynamics.mesh_force, axis=1).T
+    running = running_pair(run(slow))
+    radius = running.table.pair.pinion.base_radius
+    roll = running.teeth.start_roll + radius * result.shaft_angle
+    load = running.teeth.static(running.teeth.states(roll), running.mesh_force).load
+    expected = np.sort(load / running.mesh_force, axis=1).T
     shares = np.sort(result.mesh.load_share, axis=0)
 
     assert_close(

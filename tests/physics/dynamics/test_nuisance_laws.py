@@ -12,7 +12,7 @@ from gensig.operation.setpoint import Profile
 from gensig.sensing.nuisance import draw_tones, read_nuisances
 from gensig.sensing.tones import Tones
 from gensig.systems.nuisances import nuisance_acceleration
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import running_pair
 from gensig.systems.run import Run, Start
 
 RATE = 51200.0
@@ -46,7 +46,7 @@ def tones_of(run, part):
     units = {"gearbox": rng[0], "specimen": rng[1]}
     return draw_tones(
         read_nuisances([part]),
-        LinearPair(dynamics=pair_dynamics(run)),
+        LinearPair(running=running_pair(run)),
         units,
         rng[2],
     )
@@ -56,7 +56,7 @@ def response(run, tones, angle=None):
     """Accelerations of the channels; by default at the nominal angle of the run."""
     if angle is None:
         angle = run.system.operating.nominal(TIMES).angle
-    machine = LinearPair(dynamics=pair_dynamics(run))
+    machine = LinearPair(running=running_pair(run))
     return nuisance_acceleration(run, machine, tones, angle)
 
 
@@ -100,7 +100,9 @@ def test_unbalance_grows_with_the_square_of_the_speed(at, gear, speed_rpm):
     w = run.system.operating.speed * RATIO[gear]
     force = np.zeros((1, 6), dtype=complex)
     force[0, dofs[axes]] = 1.0, -1j * SENSE[gear]
-    unit = accelerations(pair_dynamics(run), np.array([w]), force)[0, dofs[axes]]
+    unit = accelerations(running_pair(run).dynamics, np.array([w]), force)[
+        0, dofs[axes]
+    ]
 
     tones = tones_of(run, {**UNBALANCE, "gear": gear})
     signal = response(run, tones, w * TIMES / RATIO[gear])[axes]

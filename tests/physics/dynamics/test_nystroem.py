@@ -118,7 +118,7 @@ def test_loads_of_the_teeth_are_those_of_the_classical_scheme(pairs, exact):
     for machine, seen, other in zip(pairs, found.seen, exact.seen, strict=True):
         same = seen[0] == other[0]  # a pair enters a sample earlier or later
         assert same.mean() > 0.99
-        off = np.abs(seen[1:] - other[1:])[:, same] / machine.mesh_force
+        off = np.abs(seen[1:] - other[1:])[:, same] / machine.reference_force[0]
         assert np.sqrt((off**2).mean()) < 2e-3
 
 
@@ -134,13 +134,13 @@ def test_back_flanks_carry(machine, dynamics_of):
     assert abs((found < 0.0).mean() / (exact < 0.0).mean() - 1.0) < 0.2
 
 
-def test_the_error_falls_with_the_fourth_power_of_the_step(machine, dynamics_of):
+def test_the_error_falls_with_the_fourth_power_of_the_step(machine, running_of):
     """Against another machine it does not."""
-    sound = dynamics_of(machine(QUICK))
+    sound = running_of(machine(QUICK))
     steps = (4, 16, 64)
-    coarse, fine, exact = (motions([sound], n).acceleration for n in steps)
+    coarse, fine, exact = (motions([sound.dynamics], n).acceleration for n in steps)
     changed = with_teeth(sound, start_phase=sound.teeth.start_phase + 1e-4)
-    other = motions([changed], 64).acceleration
+    other = motions([changed.dynamics], 64).acceleration
 
     def order(reference):
         first, last = (

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lane_tools import Changed, motions
+from lane_tools import motions
 
-from gensig.dynamics.equations import OverAngle
+from gensig.dynamics.motion.course import ShaftTorque
 from gensig.dynamics.pair import PINION_ROTATION, PINION_X, PINION_Y
 from gensig.dynamics.response import accelerations
 
@@ -29,26 +29,20 @@ def pair(machine, dynamics_of):
 def unbalanced(pair):
     """The pair with a force that turns with the pinion, from x to y against its rotation."""
     angle = 2.0 * np.pi * np.arange(N_NODES) / N_NODES
-    sources = tuple(
-        OverAngle(
-            dof=dof,
-            turned_by=PINION_ROTATION,
-            nodes=FORCE * wave(angle),
-            per_rad=N_NODES / (2.0 * np.pi),
-            shift=0.0,
-        )
+    forces = tuple(
+        ShaftTorque(dof=dof, table=FORCE * wave(angle), turned_by=PINION_ROTATION)
         for dof, wave in ((PINION_X, np.cos), (PINION_Y, np.sin))
     )
-    equations = replace(pair.equations, sources=sources)
-    assert not equations.is_gear_pair
-    return Changed(pair, equations)
+    changed = replace(pair, torques=(*pair.torques, *forces))
+    assert not changed.equations.is_gear_pair
+    return changed
 
 
 def test_an_unbalance_moves_the_gears_as_the_linear_machine(pair):
     """At the order 1 of its shaft, in size and phase."""
     record = {"channels": CHANNELS, "duration": DURATION, "oversampling": 5}
     plain, turned = (motions(each, **record)[0] for each in (pair, unbalanced(pair)))
-    speed, n_samples = pair.operating.speed, plain.shape[1]
+    speed, n_samples = pair.nominal.at(0.0).speed, plain.shape[1]
     turning = np.exp(-1j * speed * np.arange(n_samples) / RATE)
     found = 2.0 * np.mean((turned - plain) * turning, axis=1)
 

@@ -12,7 +12,7 @@ from gensig.dynamics.lanes import mesh_numbers
 from gensig.faults.flank_form import ProfileError
 from gensig.sensing.manufacturing import draw_specimen, perfect_specimen
 from gensig.systems.base import simulate_together
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import running_pair
 from gensig.systems.run import Run
 
 UM = 1e-6
@@ -39,7 +39,7 @@ def eccentric(xiamen, perfect, name, most, *, smooth=True):
 
 
 def dynamics_with(system, specimen, faults=()):
-    return pair_dynamics(Run(system=system, faults=faults, specimen=specimen))
+    return running_pair(Run(system=system, faults=faults, specimen=specimen))
 
 
 def rolls(system):
@@ -49,9 +49,9 @@ def rolls(system):
 
 def transmission_error(system, specimen, faults=()):
     """Approach under the set torque over a turn of the wheel, (phase,) m: lag of the wheel."""
-    dynamics = dynamics_with(system, specimen, faults)
-    return dynamics.teeth.static(
-        dynamics.teeth.states(rolls(system)), system.mesh_force
+    running = dynamics_with(system, specimen, faults)
+    return running.teeth.static(
+        running.teeth.states(rolls(system)), system.mesh_force
     ).approach
 
 
@@ -155,11 +155,11 @@ class TestProfile:
 
 def test_drawn_backlash_needs_no_further_tables(xiamen, perfect):
     for factor in (1.0, 1.2):
-        dynamics = dynamics_with(xiamen, replace(perfect, backlash_factor=factor))
-        assert dynamics.table.pinion is xiamen.mesh_table().pinion
-        backlash = mesh_numbers(dynamics.equations.meshes[0], dynamics.rest, 1e-6)[
-            BACKLASH
-        ]
+        running = dynamics_with(xiamen, replace(perfect, backlash_factor=factor))
+        assert running.table.pinion is xiamen.mesh_table().pinion
+        backlash = mesh_numbers(
+            running.equations.meshes[0], running.dynamics.rest, 1e-6
+        )[BACKLASH]
         assert_close(backlash, factor * 80 * UM, 1e-9)
 
 

@@ -12,7 +12,7 @@ from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_records
 from gensig.systems.base import simulate_together
 from gensig.systems.lead_in import simulate_with_lead_in
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import running_pair
 from gensig.systems.run import Run
 
 RATE = 51200.0
@@ -93,7 +93,7 @@ def test_a_torque_ripple_is_in_the_force_on_the_teeth(run):
         DURATION: 0.2,
     }
     rippled = run(ripple, with_mesh_state=True)
-    force = record(rippled).mesh.force / pair_dynamics(rippled).mesh_force
+    force = record(rippled).mesh.force / running_pair(rippled).mesh_force
 
     assert_close(wave(force, 60.0), 0.1, 0.02)
     assert wave(force, 50.0) < 0.01

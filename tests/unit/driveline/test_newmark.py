@@ -17,10 +17,10 @@ from line_tools import (
     with_system,
 )
 
-from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
 from gensig.driveline.time.newmark import LineSolver, _rounded_above, integrate_line
 from gensig.dynamics.equations import NONE
 from gensig.dynamics.mesh_teeth import MeshTeeth
+from gensig.dynamics.motion.course import LineCourse, ShaftTorque, constant_speed
 from gensig.errors import ConfigError, GensigError, SimulationError
 
 SOLVER = LineSolver(sampling_rate=10240.0, oversampling=4, max_energy_residual=1e-3)
@@ -106,7 +106,7 @@ class TestCourse:
 
     def test_angle_and_speed(self):
         course = LineCourse(time=np.array([-1.0, 1.0]), speed=np.array([10.0, 30.0]))
-        angle, speed = course.nominal(np.array([-3.0, -1.0, 0.0, 0.5, 2.0]))
+        angle, speed = course.over(np.array([-3.0, -1.0, 0.0, 0.5, 2.0]))
         assert speed == pytest.approx([10.0, 10.0, 20.0, 25.0, 30.0])
         assert angle == pytest.approx([-35.0, -15.0, 0.0, 11.25, 55.0])
 

@@ -41,17 +41,17 @@ class TestRecentring:
 
     @pytest.fixture(scope="class")
     @classmethod
-    def twins(cls, xiamen, dynamics_of):
+    def twins(cls, xiamen, running_of):
         """One machine, and the same whose time began ``SHIFT`` steps earlier."""
-        one = dynamics_of(xiamen, phase=0.3)
+        one = running_of(xiamen, phase=0.3)
         pair = one.table.pair
         roll = one.operating.speed * cls.SHIFT * STEP * pair.pinion.base_radius
         return one, with_teeth(one, start_phase=0.3 - roll / pair.base_pitch)
 
     @staticmethod
-    def walk(dynamics, first_step, turn=1e-3, n_steps=700):
+    def walk(running, first_step, turn=1e-3, n_steps=700):
         """Whole states (step, 2, dof) and rotations in the state (step,), from ``turn`` on."""
-        run = CoreRun([dynamics], STEP, first_step=first_step)
+        run = CoreRun([running.dynamics], STEP, first_step=first_step)
         run.state[0] += turn * run.group.rotation.reshape(-1, LANES)
         whole = []
         bare = []
@@ -128,7 +128,7 @@ class TestRecord:
         n_samples = 70
         walk = self.run(machines)
         angle = self.record(machines, n_samples)[1]
-        speed = np.array([machine.operating.speed for machine in machines])
+        speed = np.array([machine.nominal.at(0.0).speed for machine in machines])
         walk.means(1 + self.LOW_PASS.margin * FACTOR)
         for sample in range(n_samples + 1):
             turned = walk.whole[0, PINION_TURN] + sample / 51200 * speed

@@ -8,7 +8,7 @@ from gensig.dynamics.backends.nystroem.machine_lanes import is_followed_by_three
 from gensig.dynamics.backends.nystroem.method import ANY_LAW, THREE_PAIRS
 from gensig.faults.broken import MissingTooth
 from gensig.plan.request import read_request
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import running_pair
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run
 
@@ -29,7 +29,7 @@ def helical(speed, torque, faults):
     """A helical pair of tens of micrometres, so that its chords change."""
     words = [f"{SPEED}={speed}", f"{TORQUE}={5 * torque}", "mesh.n_slices=10"]
     system = read_system(read_request(["experiment=helical", *words]).config)
-    return pair_dynamics(Run(system=system, faults=faults))
+    return running_pair(Run(system=system, faults=faults)).dynamics
 
 
 @pytest.fixture(scope="module")
@@ -71,9 +71,9 @@ def whole(machines):
 
 
 def test_meshes_that_the_core_of_three_pairs_leaves(machines):
-    assert all(is_followed_by_three(each.teeth) for each in machines["three"])
+    assert all(is_followed_by_three(*each.teeth) for each in machines["three"])
     for kind in ("paper", "helical"):
-        assert not any(is_followed_by_three(each.teeth) for each in machines[kind])
+        assert not any(is_followed_by_three(*each.teeth) for each in machines[kind])
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -16,7 +16,7 @@ from core_runs import (
 
 from gensig.dynamics.pair import PINION_Y
 from gensig.systems.base import simulate_together
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import running_pair
 from gensig.systems.run import Run
 
 RATE = 51200.0
@@ -110,13 +110,13 @@ class TestRamp:
         n = len(record(changes).shaft_angle)
         deviation = turned(ramp, n) - record(changes).shaft_angle
         lag = deviation - (turned(run(still), n) - record(still).shaft_angle)
-        dynamics = pair_dynamics(ramp)
-        twist = self.ACCELERATION * dynamics.reduced_inertia / dynamics.drive_stiffness
+        running = running_pair(ramp)
+        twist = self.ACCELERATION * running.reduced_inertia / running.drive_stiffness
         if (
             rotors
         ):  # the drive holds the motor, whose coupling turns the pinion further back
             motor = ramp.system.motor
-            driven = dynamics.reduced_inertia - motor.inertia
+            driven = running.reduced_inertia - motor.inertia
             twist += self.ACCELERATION * driven / motor.coupling_stiffness
         else:
             assert_close(
@@ -164,11 +164,11 @@ class TestRamp:
 class TestTorque:
     STEP = 1 / (51200 * 5)
 
-    def carried(self, dynamics, *begins):
+    def carried(self, running, *begins):
         """Mean bearing force over four mesh periods, as shares of the set mesh force."""
-        core = CoreRun([dynamics], self.STEP, span=(0.0, 0.04))
-        n_steps = round(4 / dynamics.mesh_frequency / self.STEP)
-        stiffness = dynamics.pinion.support.stiffness_y
+        core = CoreRun([running.dynamics], self.STEP, span=(0.0, 0.04))
+        n_steps = round(4 / running.mesh_frequency / self.STEP)
+        stiffness = running.pinion.support.stiffness_y
         shares = []
         for begin in begins:
             core.means(round(begin / self.STEP) - core.now)
@@ -176,16 +176,16 @@ class TestTorque:
             for _ in range(n_steps):
                 core.means(1)
                 deflection.append(core.whole[0, PINION_Y, 0])
-            shares.append(np.mean(deflection) * stiffness / dynamics.mesh_force)
+            shares.append(np.mean(deflection) * stiffness / running.mesh_force)
         return shares
 
     @pytest.mark.parametrize("factor", [0.3, 1.8])
     def test_the_teeth_carry_their_share(self, run, factor):
         """Before and after the torque has changed."""
-        dynamics = pair_dynamics(run({TORQUE: [[-1, 1], [0.01, 1], [0.02, factor]]}))
-        before = 0.01 - 4 / dynamics.mesh_frequency
+        running = running_pair(run({TORQUE: [[-1, 1], [0.01, 1], [0.02, factor]]}))
+        before = 0.01 - 4 / running.mesh_frequency
         assert_close(
-            self.carried(dynamics, before, 0.03),
+            self.carried(running, before, 0.03),
             [1.0, factor],
             1e-2,
         )

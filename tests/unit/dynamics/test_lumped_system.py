@@ -89,10 +89,10 @@ def test_rates_of_an_oscillator():
     ids=["pair", "rotors"],
 )
 @pytest.mark.parametrize("name", ["stiffness", "damping"])
-def test_a_group_holds_the_matrices_of_each_machine(machine, dynamics_of, kinds, name):
+def test_a_group_holds_the_matrices_of_each_machine(machine, running_of, kinds, name):
     """Also where a machine lacks an entry of its neighbour; empty lanes repeat the first."""
-    machines = [dynamics_of(machine(changes)) for changes in kinds]
-    group = pack(machines, 1e-6)
+    machines = [running_of(machine(changes)) for changes in kinds]
+    group = pack([each.dynamics for each in machines], 1e-6)
     n = len(machines[0].dofs)
 
     row, column = group.coupled.reshape(-1, 2).T
@@ -100,13 +100,13 @@ def test_a_group_holds_the_matrices_of_each_machine(machine, dynamics_of, kinds,
 
     diagonal = getattr(group, name)
     others = {"stiffness": group.sprung, "damping": group.damped}[name]
-    for lane, dynamics in enumerate([*machines, machines[0]]):
+    for lane, running in enumerate([*machines, machines[0]]):
         matrix = np.diag(diagonal[lane::LANES])
         matrix[row, column] = matrix[column, row] = others[lane::LANES]
         held = group.held[lane::LANES]
         slowed = {"stiffness": 1.0, "damping": group.held_damping[lane]}[name]
         matrix += slowed * np.outer(held, held)
-        assert_close(matrix, getattr(dynamics.equations, f"governed_{name}"), 1e-15)
+        assert_close(matrix, getattr(running.equations, f"governed_{name}"), 1e-15)
 
 
 def test_one_compiled_program_takes_every_machine(machine, dynamics_of):
@@ -127,22 +127,22 @@ def test_one_compiled_program_takes_every_machine(machine, dynamics_of):
     ids=["pair", "rotors", "light"],
 )
 def test_the_compiled_right_hand_side_is_that_of_the_matrices(
-    machine, dynamics_of, changes, time
+    machine, running_of, changes, time
 ):
     """M q'' = f - K q - C v + mesh forces, also in a step that recentres the rotations."""
-    dynamics = dynamics_of(machine(changes))
+    running = running_of(machine(changes))
     rng = np.random.default_rng(6)
-    system = dynamics.equations
-    n = len(dynamics.dofs)
-    pinion, wheel = (gear.base_radius for gear in dynamics.table.pair.gears.values())
+    system = running.equations
+    n = len(running.dofs)
+    pinion, wheel = (gear.base_radius for gear in running.table.pair.gears.values())
     for _ in range(10):
-        q = rng.uniform(0.8, 1.5) * dynamics.static_start(0.0)
+        q = rng.uniform(0.8, 1.5) * running.dynamics.static_start(0.0)
         q += 1e-3 * rng.standard_normal() * system.rotation
         q[[0, 3]] += 1e-5 * rng.standard_normal(2)
         q[6:] += 1e-4 * rng.standard_normal(n - 6)
         v = 1e-3 * rng.standard_normal(n) + rng.standard_normal() * system.rotation
 
-        (law,) = laws(dynamics, motion_of(dynamics, time, q, v))
+        (law,) = laws(running, motion_of(running, time, q, v))
         normal, friction, moment_p, moment_w, along = law[:5]
         mesh = np.zeros(n)
         mesh[:3] = (
@@ -156,10 +156,10 @@ def test_the_compiled_right_hand_side_is_that_of_the_matrices(
             wheel * normal + moment_w,
         )
         held = system.governed_stiffness @ q + system.governed_damping @ v
-        expected = dynamics.set_force - held + mesh
+        expected = running.dynamics.forces(np.zeros(1))[0] - held + mesh
 
-        force = system.mass * right_hand_side(dynamics, time, q, v)
+        force = system.mass * right_hand_side(running, time, q, v)
         stiff = np.abs(system.governed_stiffness) @ np.abs(q)
-        terms = np.abs(dynamics.set_force) + stiff + np.abs(mesh)
+        terms = np.abs(running.dynamics.forces(np.zeros(1))[0]) + stiff + np.abs(mesh)
         assert normal > 0
         assert_close(force / terms, expected / terms, atol=1e-9)

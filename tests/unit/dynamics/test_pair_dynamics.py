@@ -24,13 +24,13 @@ from gensig.errors import ConfigError, SimulationError
 RATE = 51200.0
 
 
-def check_step(dynamics, rate, steps, max_error=None):
+def check_step(running, rate, steps, max_error=None):
     """Raise or warn as an integration with so many steps a sample would."""
     solver = Solver(oversampling=steps, precision="float64", max_error=max_error)
-    check_machine(dynamics, solver, rate)
+    check_machine(running.dynamics, solver, rate)
 
 
-def recorded(system, dynamics, **changes):
+def recorded(system, running, **changes):
     values = {
         "sampling_rate": RATE,
         "duration": 0.1,
@@ -38,21 +38,21 @@ def recorded(system, dynamics, **changes):
         **changes,
     }
     return integrate(
-        [dynamics],
+        [running.dynamics],
         values.pop("solver", system.solver),
         **values,
     )
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.4, 0.9])
-def test_static_start_is_in_equilibrium(xiamen, dynamics_of, phase):
-    dynamics = dynamics_of(xiamen, phase=phase)
-    q = dynamics.static_start(0.0)
-    stiffness = dynamics.equations.governed_stiffness
-    approach = q @ dynamics.approach_direction()
-    force = laws(dynamics, [(dynamics.teeth.start_roll, approach, 0.0, 0.0)])[0, 0]
+def test_static_start_is_in_equilibrium(xiamen, running_of, phase):
+    running = running_of(xiamen, phase=phase)
+    q = running.dynamics.static_start(0.0)
+    stiffness = running.equations.governed_stiffness
+    approach = q @ running.approach_direction()
+    force = laws(running, [(running.teeth.start_roll, approach, 0.0, 0.0)])[0, 0]
 
-    assert_close(force, dynamics.mesh_force, 1e-6)
+    assert_close(force, running.mesh_force, 1e-6)
     assert_close(
         stiffness[[1, 4], [1, 4]] * q[[1, 4]],
         [force, -force],
@@ -60,17 +60,17 @@ def test_static_start_is_in_equilibrium(xiamen, dynamics_of, phase):
     )
 
 
-def test_reduced_values(xiamen, dynamics_of):
-    dynamics = dynamics_of(xiamen)
+def test_reduced_values(xiamen, running_of):
+    running = running_of(xiamen)
     # spur reference (docs/validation.md), section 3.4
-    assert_close(dynamics.mesh_force, 925.37, 1e-5)
-    assert_close(dynamics.mesh_frequency, 690.0, 1e-12)
+    assert_close(running.mesh_force, 925.37, 1e-5)
+    assert_close(running.mesh_frequency, 690.0, 1e-12)
 
     inverse = 21.61293e-3**2 / 4.858e-5 + 78.93418e-3**2 / 3.509e-3
-    assert_close(dynamics.equivalent_mass, 1 / inverse, 1e-5)
+    assert_close(running.equivalent_mass, 1 / inverse, 1e-5)
 
-    faulty = dynamics_of(xiamen, MISSING).mean_mesh_stiffness
-    assert_close(faulty, dynamics.mean_mesh_stiffness, 1e-9)
+    faulty = running_of(xiamen, MISSING).mean_mesh_stiffness
+    assert_close(faulty, running.mean_mesh_stiffness, 1e-9)
     assert_close(
         faulty,
         xiamen.stiffness_curves().mesh_stiffness.mean(),
@@ -79,11 +79,11 @@ def test_reduced_values(xiamen, dynamics_of):
 
 
 def test_friction_torque_is_the_imbalance_of_drive_and_load(
-    xiamen, dynamics_of, machine
+    xiamen, running_of, machine
 ):
-    dynamics = dynamics_of(xiamen)
-    torque = dynamics.friction_torque()
-    force = dynamics.set_force
+    running = running_of(xiamen)
+    torque = running.friction_torque()
+    force = running.dynamics.forces(np.zeros(1))[0]
     # Niemann & Winter: loss factor of a constant load over the path of contact
     pair = xiamen.pair
     pitch = xiamen.pair.base_pitch
@@ -95,12 +95,12 @@ def test_friction_torque_is_the_imbalance_of_drive_and_load(
 
     assert_close(torque / xiamen.operating.torque, loss, 0.01)
 
-    rough = dynamics_of(machine({"mesh.friction_coefficient": 0.1}))
+    rough = running_of(machine({"mesh.friction_coefficient": 0.1}))
     assert_close(rough.friction_torque(), 2 * torque, 1e-9)
     assert_close(force[2] + force[5] / xiamen.pair.ratio, torque, 1e-9)
 
 
-def test_settling_follows_the_slowest_motion_up_to_a_limit(machine, dynamics_of):
+def test_settling_follows_the_slowest_motion_up_to_a_limit(machine, running_of):
     decay = math.log(1e4) / (2 * math.pi * 0.7)
     for changes, expected in (
         ({}, decay / 5),
@@ -108,7 +108,7 @@ def test_settling_follows_the_slowest_motion_up_to_a_limit(machine, dynamics_of)
         (QUICK, decay / 20),
     ):
         assert_close(
-            dynamics_of(machine(changes)).settling_time,
+            running_of(machine(changes)).dynamics.settling_time,
             expected,
             1e-3,
         )
@@ -127,11 +127,11 @@ class TestRefusals:
         [(6e3, 2), (6e3, 3), (1e3, 17), (300.0, 2)],
     )
     def test_an_unstable_step_names_the_longest_stable_one(
-        self, xiamen, dynamics_of, rate, steps
+        self, xiamen, running_of, rate, steps
     ):
-        dynamics = dynamics_of(xiamen)
+        running = running_of(xiamen)
         with pytest.raises(SimulationError) as caught:
-            check_step(dynamics, rate, steps)
+            check_step(running, rate, steps)
 
         text = str(caught.value)
         assert text.startswith(
@@ -140,25 +140,25 @@ class TestRefusals:
         assert "\n" not in text
 
         enough = int(re.search(r"to at least (\d+)$", text)[1])
-        check_step(dynamics, rate, enough)
+        check_step(running, rate, enough)
         with pytest.raises(SimulationError, match=f"to at least {enough}$"):
-            check_step(dynamics, rate, enough - 1)
+            check_step(running, rate, enough - 1)
 
-    def test_a_coarse_step_without_a_check_warns(self, xiamen, dynamics_of, recwarn):
-        dynamics = dynamics_of(xiamen)
+    def test_a_coarse_step_without_a_check_warns(self, xiamen, running_of, recwarn):
+        running = running_of(xiamen)
         text = r"internal steps to a period of the mesh mode .* raise solver"
         with pytest.warns(CoarseStepWarning, match=text) as warned:
-            check_step(dynamics, RATE, 2)
+            check_step(running, RATE, 2)
         result = re.search(
             r"solver.oversampling to (\d+)",
             str(warned[0].message),
         )
         enough = int(result[1])
         with pytest.warns(CoarseStepWarning):
-            check_step(dynamics, RATE, enough - 1)
+            check_step(running, RATE, enough - 1)
         recwarn.clear()
-        check_step(dynamics, RATE, enough)
-        check_step(dynamics, RATE, 2, max_error=1e-3)
+        check_step(running, RATE, enough)
+        check_step(running, RATE, 2, max_error=1e-3)
 
         assert not recwarn.list
 
@@ -216,18 +216,18 @@ class TestRefusals:
         with pytest.raises(SimulationError, match=text):
             machine({key: value}).check()
 
-    def test_its_frequency_is_told_in_hz(self, machine, xiamen, dynamics_of):
-        dynamics = dynamics_of(xiamen)
-        place = dynamics.dofs.index("pinion_y")
-        stiffness, mass = 1e14, dynamics.equations.mass[place]
+    def test_its_frequency_is_told_in_hz(self, machine, xiamen, running_of):
+        running = running_of(xiamen)
+        place = running.dofs.index("pinion_y")
+        stiffness, mass = 1e14, running.equations.mass[place]
         with pytest.raises(SimulationError) as refused:
             machine({"gear.pinion.support.stiffness_y_n_per_m": stiffness}).check()
         (told,) = re.findall(r"pinion_y at (\S+) Hz", str(refused.value))
         natural = math.sqrt(stiffness / mass) / (2 * math.pi)
         assert float(told) == pytest.approx(natural, rel=1e-2)
 
-    def test_integrations(self, xiamen, dynamics_of):
-        dynamics = dynamics_of(xiamen)
+    def test_integrations(self, xiamen, running_of):
+        running = running_of(xiamen)
         for changes, text in (
             (
                 {"channels": ("housing",)},
@@ -239,7 +239,7 @@ class TestRefusals:
             ),
         ):
             with pytest.raises(ConfigError, match=re.escape(text)):
-                recorded(xiamen, dynamics, **changes)
+                recorded(xiamen, running, **changes)
 
     @pytest.mark.parametrize(
         ("part", "changes", "text"),

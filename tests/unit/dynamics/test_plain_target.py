@@ -17,7 +17,7 @@ from gensig.driveline.side_by_side import line_records
 from gensig.dynamics import _written
 from gensig.dynamics._vector import EIGHT, n_lanes
 from gensig.plan.request import read_request
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import running_pair
 from gensig.systems.registry import read_system
 
 STEP, N_STEPS = 1.0 / (51200 * 5), 60
@@ -25,7 +25,11 @@ RAMP = "operating.speed_profile=[[0,1],[0.001,1.4]]"
 RIPPLE = "excitation.motor.torque_ripple={share: 0.05, order: 12}"
 # overrides, reader of the machine, and its equations
 CASES = {
-    "pair": (["experiment=quickstart", RAMP], read_system, pair_dynamics),
+    "pair": (
+        ["experiment=quickstart", RAMP],
+        read_system,
+        lambda run: running_pair(run).dynamics,
+    ),
     "two_stage": (
         ["experiment=two_stage", RIPPLE],
         read_line_machine,

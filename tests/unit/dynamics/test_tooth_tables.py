@@ -32,10 +32,10 @@ N_PINION, N_WHEEL = 6, 8  # distinct teeth with the sound ones
 
 
 @pytest.fixture(scope="module", params=LAWS)
-def dynamics(request, machine, dynamics_of):
+def running(request, machine, running_of):
     errors = np.random.default_rng(3).normal(0, 2e-6, 84)
     system = machine({**LAWS[request.param], "gear.backlash_um": 10})
-    return dynamics_of(
+    return running_of(
         system,
         FAULTS,
         pinion_error=errors[:23],
@@ -44,11 +44,11 @@ def dynamics(request, machine, dynamics_of):
 
 
 @pytest.fixture(scope="module")
-def motions(dynamics):
+def motions(running):
     """Instants over more turns than a wheel has, driven and coasting."""
     rng = np.random.default_rng(9)
     n = 4000
-    roll = dynamics.table.pair.base_pitch * rng.uniform(-200, 200, n)
+    roll = running.table.pair.base_pitch * rng.uniform(-200, 200, n)
     approach = rng.uniform(-4e-5, 4e-5, n)
     rate = 1e-3 * rng.standard_normal(n)
     return np.column_stack([roll, approach, rate, rng.uniform(2, 6, n)])
@@ -63,23 +63,21 @@ def both_layouts(make, monkeypatch):
     return results
 
 
-def test_many_products_are_stored_tooth_by_tooth(xiamen, dynamics_of, dynamics):
-    per_row = LANES * 4 * dynamics.table.position.size
-    few = dynamics_of(xiamen, PITS[:5])
+def test_many_products_are_stored_tooth_by_tooth(xiamen, running_of, running):
+    per_row = LANES * 4 * running.table.position.size
+    few = running_of(xiamen, PITS[:5])
     end = len(missing_cells())
-    assert len(pack([few], 1e-6).table) == per_row * 6 + end
+    assert len(pack([few.dynamics], 1e-6).table) == per_row * 6 + end
     n_rows = N_PINION + N_WHEEL
-    assert len(pack([dynamics], 1e-6).table) == per_row * n_rows + end
+    assert len(pack([running.dynamics], 1e-6).table) == per_row * n_rows + end
 
 
 @pytest.mark.parametrize("precision", ["float64", "float32"])
-def test_every_pair_of_teeth_has_the_sum_of_its_tables(
-    dynamics, precision, monkeypatch
-):
+def test_every_pair_of_teeth_has_the_sum_of_its_tables(running, precision, monkeypatch):
     """Compliance, gap and slopes at every node; a missing pair stands after the last lane's."""
     monkeypatch.setattr(lanes, "MOST_PAIRS", np.inf)
-    table, end = dynamics.table, missing_cells()
-    packed = pack([dynamics], 1e-6, precision).table
+    table, end = running.table, missing_cells()
+    packed = pack([running.dynamics], 1e-6, precision).table
     teeth = lanes.tooth_rows(table)
     values = packed[: -len(end)].reshape(n_lanes(precision), -1, table.position.size, 4)
     sound = np.arange(84) != 20
@@ -98,11 +96,11 @@ def test_every_pair_of_teeth_has_the_sum_of_its_tables(
     np.testing.assert_array_equal(packed[-len(end) :], end.astype(precision))
 
 
-def test_both_layouts_give_one_law_and_motion(dynamics, motions, monkeypatch):
+def test_both_layouts_give_one_law_and_motion(running, motions, monkeypatch):
     def walk():
-        run = CoreRun([dynamics], 1 / (51200 * 5))
+        run = CoreRun([running.dynamics], 1 / (51200 * 5))
         return (
-            laws(dynamics, motions),
+            laws(running, motions),
             run.means(1500),
             run.whole,
         )

@@ -51,12 +51,12 @@ BEARING = (9, 7.94e-3, 39.04e-3)  # balls, their diameter, pitch diameter
 
 
 @pytest.fixture(scope="module")
-def dynamics(xiamen, dynamics_of):
-    return dynamics_of(xiamen)
+def running(xiamen, running_of):
+    return running_of(xiamen)
 
 
 @pytest.fixture(scope="module")
-def draw(dynamics):
+def draw(running):
     """Function that draws the tones of parts for a gearbox, a specimen and a record."""
 
     def make(*parts, gearbox=1, specimen=1, record=1):
@@ -67,7 +67,7 @@ def draw(dynamics):
         nuisances = read_nuisances(list(parts))
         return draw_tones(
             nuisances,
-            LinearPair(dynamics=dynamics),
+            LinearPair(running=running),
             units,
             default_rng([2, record]),
         )
@@ -151,7 +151,7 @@ def test_an_unbalance_turns_by_the_sense_of_its_gear(tones_of, gear, sense):
     assert_allclose(turned, 0.1 * sense)
 
 
-def test_orders_and_sizes_of_a_coupling(dynamics, tones_of):
+def test_orders_and_sizes_of_a_coupling(running, tones_of):
     tones = tones_of("coupling_misalignment")
     assert_array_equal(tones.order, [2, 1, 2, 3])
 
@@ -161,7 +161,7 @@ def test_orders_and_sizes_of_a_coupling(dynamics, tones_of):
         [0.0, 0.0, 1e-3 * 20.0],
     )
 
-    sizes = 0.01 * dynamics.mesh_force * np.array([0.5, 1.0, 0.3])
+    sizes = 0.01 * running.mesh_force * np.array([0.5, 1.0, 0.3])
     assert_allclose(
         np.linalg.norm(force[:, :2], axis=1),
         sizes,
@@ -171,7 +171,7 @@ def test_orders_and_sizes_of_a_coupling(dynamics, tones_of):
     assert_allclose(direction, direction[0].real)
 
 
-def test_orders_and_sizes_of_looseness(dynamics, tones_of):
+def test_orders_and_sizes_of_looseness(running, tones_of):
     tones = tones_of("looseness")
     assert_array_equal(
         tones.order,
@@ -180,10 +180,10 @@ def test_orders_and_sizes_of_looseness(dynamics, tones_of):
 
     shares = np.array([0.5, 1.0, 0.5 / 1.5, 0.5, 0.5 / 2.5, 1 / 3])
     sizes = np.linalg.norm(tones.force, axis=1)
-    assert_allclose(sizes, 0.01 * dynamics.mesh_force * shares)
+    assert_allclose(sizes, 0.01 * running.mesh_force * shares)
 
 
-def test_orders_and_sizes_of_a_bearing(dynamics, tones_of):
+def test_orders_and_sizes_of_a_bearing(running, tones_of):
     tones = tones_of("bearing")
     orders = bearing_orders(*BEARING, 0.0, slip=0.01)
     expected = [orders.cage]
@@ -195,7 +195,7 @@ def test_orders_and_sizes_of_a_bearing(dynamics, tones_of):
 
     assert_allclose(sorted(tones.order), sorted(expected))
 
-    support = dynamics.pinion.support
+    support = running.pinion.support
     force = 1e-7 * np.array([support.stiffness_x, support.stiffness_y, 0.0])
     sizes = np.abs(tones.force)
     assert_allclose(sizes[0], force)
@@ -228,12 +228,10 @@ def test_orders_and_sizes_of_a_neighbour(tones_of):
     ("gear", "turn"),
     [("pinion", "pinion_rotation"), ("wheel", "wheel_rotation")],
 )
-def test_a_neighbour_turns_a_gear_as_the_set_torque_does(
-    dynamics, tones_of, gear, turn
-):
+def test_a_neighbour_turns_a_gear_as_the_set_torque_does(running, tones_of, gear, turn):
     """Its mesh is what drives a driving gear and what holds a driven one back."""
     tones = tones_of("neighbour_mesh", {"gear": gear})
-    outside = dynamics.set_force[dynamics.dofs.index(turn)]
+    outside = running.dynamics.forces(np.zeros(1))[0][running.dofs.index(turn)]
     along = tones.force[:, 0] / math.cos(math.radians(60))
     arm = tones.force[:, 2] / along
 

@@ -23,7 +23,7 @@ from gensig.systems.integration_checks import finer, is_too_coarse
 from gensig.systems.pair_machine import (
     GearPairMachine,
     PairMachine,
-    pair_dynamics,
+    running_pair,
 )
 from gensig.systems.registry import read_sliced_pair
 from gensig.systems.run import CHECKS, Run, Start
@@ -181,7 +181,7 @@ def test_the_channels_of_a_pair_are_its_degrees_of_freedom(name, is_driven):
     words = [f"system.{end}={{{keys}}}" for end in ("motor", "load") if is_driven]
     machine = read(name, *words)
 
-    assert machine.channels == pair_dynamics(Run(system=machine, faults=())).dofs
+    assert machine.channels == running_pair(Run(system=machine, faults=())).dofs
     assert ("motor_rotation" in machine.channels) == is_driven
 
 

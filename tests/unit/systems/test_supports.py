@@ -24,7 +24,7 @@ from gensig.sensing.manufacturing import (
     nominal_gearbox,
     with_damping_ratio,
 )
-from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.pair_machine import running_pair
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run
 from gensig.systems.supports import DAMPING_RATIO, in_gearbox, read_holding
@@ -56,8 +56,8 @@ def damping_of(side):
 
 def supports(run):
     """Stiffness and damping of pinion x, y and wheel x, y, (support,), and damping ratios."""
-    dynamics = pair_dynamics(run)
-    sides = dynamics.pinion, dynamics.wheel
+    running = running_pair(run)
+    sides = running.pinion, running.wheel
     stiffness = np.concatenate([stiffness_of(side) for side in sides])
     damping = np.concatenate([damping_of(side) for side in sides])
     mass = np.repeat(
@@ -264,7 +264,7 @@ class TestRecords:
             operating = run.system.operating
             decay = operating.drive_frequency * operating.drive_damping_ratio
             expected = math.log(1e4) / (tau * decay)
-            assert_close(pair_dynamics(run).settling_time, expected, 1e-3)
+            assert_close(running_pair(run).dynamics.settling_time, expected, 1e-3)
 
 
 def test_axial_and_tilt_supports_are_as_given_where_they_are(config_with):

@@ -26,7 +26,7 @@ from gensig.dynamics.backends.nystroem._group import (
 )
 from gensig.dynamics.backends.nystroem._pairs import MISSING_COMPLIANCE, MISSING_GAP
 from gensig.dynamics.backends.nystroem.force_law import ForceLaw, of_law
-from gensig.dynamics.equations import A_TURN, N_IN_PLANE, Dynamics, Equations
+from gensig.dynamics.equations import A_TURN, N_IN_PLANE, Equations
 from gensig.dynamics.lanes import (
     MeshLanes,
     ToothRows,
@@ -35,6 +35,7 @@ from gensig.dynamics.lanes import (
     side_by_side,
 )
 from gensig.dynamics.mesh_teeth import MeshTeeth
+from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import SimulationError
 
 Array = NDArray[np.float64]
@@ -326,11 +327,11 @@ def _profile(lanes: Sequence[Lane], span: tuple[float, float]) -> Profile:
     at_sources = groups.N_PROFILE + 2 * n_dof
     n_rows = at_sources + 2 * len(lanes[0].equations.sources)
     holding = np.stack([lane.equations.holding(lane.rest) for lane in lanes])
-    if all(lane.dynamics.is_steady for lane in lanes):
+    if all(lane.dynamics.nominal.is_steady for lane in lanes):
         now = np.zeros(1)
         values = np.zeros((1, n_rows, len(lanes)))
         for number, lane in enumerate(lanes):
-            values[0, groups.SPEED, number] = lane.dynamics.course(now)[1][0]
+            values[0, groups.SPEED, number] = lane.dynamics.nominal.over(now)[1][0]
             values[0, at_sources::2, number] = lane.dynamics.factors(now)[0]
         steady = np.stack([lane.dynamics.forces(now)[0] for lane in lanes])
         return Profile(
@@ -339,7 +340,7 @@ def _profile(lanes: Sequence[Lane], span: tuple[float, float]) -> Profile:
     first, edges = profile_cells(span)
     values = np.zeros((len(edges) - 1, n_rows, len(lanes)))
     for number, lane in enumerate(lanes):
-        angle, speed = lane.dynamics.course(edges)
+        angle, speed = lane.dynamics.nominal.over(edges)
         forces = lane.dynamics.forces(edges) - holding[number]
         values[:, groups.ANGLE, number] = angle[:-1]
         values[:, groups.SPEED, number] = speed[:-1]

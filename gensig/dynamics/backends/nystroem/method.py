@@ -23,7 +23,7 @@ from gensig.dynamics.backends.step_limits import (
     COARSE_STABILITY,
     too_long_steps,
 )
-from gensig.dynamics.equations import Dynamics
+from gensig.dynamics.motion.dynamics import Dynamics
 
 
 def coarsest_oversampling(

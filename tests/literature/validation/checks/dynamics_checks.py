@@ -20,8 +20,8 @@ from validation.case import (
     RECORD_TURNS,
     Array,
     Case,
-    pair_dynamics,
     record,
+    running_pair,
     with_fault,
     with_words,
 )
@@ -148,14 +148,14 @@ def _natural_frequency(case: Case, at: str) -> float:
     counted.
     """
     stiffness, mode = at.split()
-    dynamics = pair_dynamics(case)
-    system = dynamics.equations
-    direction = dynamics.approach_direction()
+    running = running_pair(case)
+    system = running.equations
+    direction = running.approach_direction()
     matrix = system.governed_stiffness + float(stiffness) * np.outer(
         direction, direction
     )
     along = [
-        index for index, name in enumerate(dynamics.dofs) if not name.endswith("_x")
+        index for index, name in enumerate(running.dofs) if not name.endswith("_x")
     ]
     reduced = matrix[np.ix_(along, along)] / system.mass[along][:, None]
     frequency = np.sqrt(np.sort(np.abs(np.linalg.eigvals(reduced)))) / (2.0 * np.pi)
@@ -164,8 +164,8 @@ def _natural_frequency(case: Case, at: str) -> float:
 
 def _support_frequency(case: Case, at: str) -> float:
     """Undamped frequency in Hz of one gear on its own support; ``at`` is its degree of freedom."""
-    dynamics = pair_dynamics(case)
-    system, index = dynamics.equations, dynamics.dofs.index(at)
+    running = running_pair(case)
+    system, index = running.equations, running.dofs.index(at)
     return float(
         np.sqrt(system.governed_stiffness[index, index] / system.mass[index])
         / (2.0 * np.pi)

@@ -1,4 +1,4 @@
-"""Deflection of a line of toothed meshes at rest under steady forces."""
+"""Deflection of a machine at rest under steady forces."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ OUT_OF_BOUNDS = 1e6  # m, rad, m/s or rad/s
 FREE = 1e-12  # share of the springs that hold a line which turns freely
 
 
-def line_at_rest(
+def at_rest(
     system: Equations, mean: Array, scale: Array, angle: float, force: Array
 ) -> Array:
     """Deflection under forces (dof,) at a nominal angle of the reference in rad, (dof,).

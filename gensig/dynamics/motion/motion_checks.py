@@ -1,4 +1,4 @@
-"""Checks of a line's numbers: its motion must be one that a machine can have."""
+"""Checks of a machine's numbers: its motion must be one that a machine can have."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gensig.driveline.time.course import ShaftTorque
 from gensig.dynamics.equations import A_TURN, NONE, Equations, Mesh
+from gensig.dynamics.motion.course import ShaftTorque
 from gensig.errors import ConfigError, SimulationError
 
 # of its terms, by which nominal rotation may close a mesh: radii come rounded

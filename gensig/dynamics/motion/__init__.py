@@ -1,0 +1,1 @@
+"""Machines in motion: nominal rotation, torques and the deflection at rest."""
