@@ -14,7 +14,6 @@ from scipy.integrate import solve_ivp
 
 from benchmarks import _classical_scheme, _scalar
 from benchmarks._measure import in_turn
-from gensig.driveline.side_by_side.line_records import running_line_of
 from gensig.dynamics._layout import N_LAW
 from gensig.dynamics._vector import LANES, n_lanes
 from gensig.dynamics.backends.group_run import Core, GroupRun
@@ -76,7 +75,7 @@ def two_stage_boxes(n: int = n_lanes("float32")) -> list[Dynamics]:
     machine = read_machine(config)
     starts = (Start(tooth_pinion=k, tooth_wheel=2 * k, phase=0.3) for k in range(n))
     runs = [Run(system=machine, faults=(), start=start) for start in starts]
-    return [running_line_of(run).dynamics for run in runs]
+    return [machine.ready(run).dynamics for run in runs]
 
 
 def rates(works: dict[str, Work], runs: int) -> dict[str, float]:

@@ -26,7 +26,7 @@ from gensig.production import folder as generation
 from gensig.production import shard_writing
 from gensig.record import simulate as records
 from gensig.record.inputs import InputReader
-from gensig.systems import pair_machine
+from gensig.systems import pair_machine, side_by_side
 
 PLAN, TABLES, EQUATIONS = "machine and plan row", "mesh tables", "equations and packing"
 SETTLING, RECORDING, CHECKING = (
@@ -56,7 +56,7 @@ CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (Dynamics, "static_start", EQUATIONS),
     (GroupRun, "advance", SETTLING),
     (GroupRun, "record", RECORDING),
-    (pair_machine, "checks", CHECKING),
+    (side_by_side, "checks", CHECKING),
     (records, "_record", NOISE),
     (shard_writing, "open_shard", WRITING),
     (ShardWriter, "__enter__", WRITING),
@@ -102,11 +102,12 @@ class Stages:
 
         Recordings of fewer samples than ``n_whole`` are those of the error check.
         """
-        counted = self._counted(pair_machine.simulate_pairs)
+        counted = self._counted(side_by_side.simulate_side_by_side)
         with ExitStack() as patches:
-            patches.enter_context(
-                mock.patch.object(pair_machine, "simulate_pairs", counted)
-            )
+            for owner in (pair_machine, side_by_side):
+                patches.enter_context(
+                    mock.patch.object(owner, "simulate_side_by_side", counted)
+                )
             for owner, name, stage in CLOCKED:
                 clocked = self._clocked(getattr(owner, name), stage, n_whole)
                 patches.enter_context(mock.patch.object(owner, name, clocked))

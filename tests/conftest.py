@@ -7,19 +7,19 @@ from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import settings
 
 import gensig.compilation
-from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.dynamics.pair import RunningPair
+from gensig.geometry.contact import SIDES
 from gensig.geometry.gear import Gear
 from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
-from gensig.systems.pair_machine import GearPairMachine
+from gensig.systems.pair_machine import GearPairMachine, running_pair
 from gensig.systems.registry import read_system
+from gensig.systems.run import Run
 
 # An example that takes long on a busy machine is no failure.
 settings.register_profile("untimed", deadline=None)
@@ -120,31 +120,18 @@ def running_of() -> Callable[..., RunningPair]:
     """A machine's pair with perfect teeth, or with the given tooth errors."""
 
     def make(
-        system: GearPairMachine, faults=(), *, phase=0.3, **errors: Any
+        system: GearPairMachine, faults=(), *, phase=0.3, **given: Any
     ) -> RunningPair:
-        counts = {
-            "pinion": system.pair.pinion.n_teeth,
-            "wheel": system.pair.wheel.n_teeth,
-        }
-        values = {
-            f"{gear}_{key}": np.zeros(n)
-            for gear, n in counts.items()
+        running = running_pair(Run(system=system, faults=tuple(faults)))
+        teeth = replace(running.teeth, start_phase=phase)
+        errors, tilts = (
+            tuple(
+                given.get(f"{gear}_{key}", zeros)
+                for gear, zeros in zip(SIDES, teeth.errors, strict=True)
+            )
             for key in ("error", "tilt")
-        }
-        values |= errors
-        return RunningPair(
-            teeth=MeshTeeth(
-                table=system.mesh_table(faults),
-                errors=(values["pinion_error"], values["wheel_error"]),
-                tilts=(values["pinion_tilt"], values["wheel_tilt"]),
-                start_phase=phase,
-            ),
-            pinion=system.pinion,
-            wheel=system.wheel,
-            motor=system.motor,
-            load=system.load,
-            operating=system.operating,
         )
+        return replace(running, teeth=replace(teeth, errors=errors, tilts=tilts))
 
     return make
 

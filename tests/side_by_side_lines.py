@@ -3,10 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from stacked_motions import integrate, stacked
+from stacked_motions import integrate
 
-from gensig.dynamics.backends.base import Integration
-from gensig.dynamics.backends.registry import BACKENDS
 from gensig.dynamics.decimation import in_band_error
 from gensig.dynamics.integrator import Solver
 from gensig.dynamics.pair import PINION_ROTATION
@@ -52,17 +50,9 @@ def assert_moves_as_a_line(pair, oversampling=5):
     """Check that a pair and the line of one mesh that is made of it have one motion."""
     solver = Solver(oversampling=oversampling, precision="float64", backend="nystroem")
     record = {"sampling_rate": RATE, "duration": 0.05, "channels": CHANNELS}
-    expected = integrate([pair], solver, **record)
-    integration = Integration(
-        **record,
-        with_mesh_state=False,
-        oversampling=oversampling,
-        precision="float64",
-        max_error=None,
-    )
     line = as_line(pair)
     assert not line.equations.is_gear_pair
-    found = stacked(BACKENDS["nystroem"].integrate([line], integration))
+    found, expected = (integrate([each], solver, **record) for each in (line, pair))
 
     assert in_band_error(found.acceleration, expected.acceleration, RATE)[0] < 1e-5
     assert np.abs(found.angle - expected.angle).max() < 1e-7

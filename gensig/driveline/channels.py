@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,14 +12,48 @@ from numpy.typing import NDArray
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.line_gears import gear_dof
 from gensig.driveline.running import RunningLine
-from gensig.driveline.side_by_side.line_records import LineSignals
 from gensig.driveline.time.newmark import LineMotion
+from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.sensing.encoder import Disc
 from gensig.sensing.toothed_wheel import ToothedWheel, instantaneous_speed
 from gensig.systems.run import Run
 from gensig.units import SPEED
 
 Array = NDArray[np.float64]
+Channel = tuple[str, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LineSignals:
+    """Signals of a line by channel, (sample,), and the nominal motion of its reference.
+
+    A channel is a kind, ``acceleration`` or ``angle``, and a degree of freedom; signals are
+    deviations from nominal rotation in m/s2, rad/s2 or rad.
+    """
+
+    signals: dict[Channel, Array]
+    nominal_angle: Array
+    nominal_speed: Array
+
+
+def line_signals(
+    line: Dynamics, dofs: Sequence[str], acceleration: Array, angle: Array, rate: float
+) -> LineSignals:
+    """Signals of a motion of the two-evaluation core; angles are deviations.
+
+    ``acceleration`` (dof, sample) of the degrees of freedom named, ``angle`` (angle, sample) of
+    those that the line gives out, ``rate`` Hz.
+    """
+    nominal_angle, nominal_speed = line.nominal.over(np.arange(angle.shape[1]) / rate)
+    signals: dict[Channel, Array] = {
+        ("acceleration", line.dofs.index(name)): row
+        for name, row in zip(dofs, acceleration, strict=True)
+    }
+    for dof, turned in zip(line.system.angles, angle, strict=True):
+        signals["angle", dof] = turned - line.system.rotation[dof] * nominal_angle
+    return LineSignals(
+        signals=signals, nominal_angle=nominal_angle, nominal_speed=nominal_speed
+    )
 
 
 def channel(line: RunningLine, followed: int, name: str) -> tuple[str, int]:

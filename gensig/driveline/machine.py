@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.driveline import loads
-from gensig.driveline.channels import channel, channel_rows
+from gensig.driveline.channels import channel, channel_rows, line_signals
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.line_gears import (
     gear_channels,
@@ -44,14 +44,8 @@ from gensig.driveline.running import (
     operating_course,
     reference_force,
     running_line,
-    single_thread,
     steady_course,
 )
-from gensig.driveline.side_by_side.line_mesh_states import (
-    angle_channels,
-    line_mesh_states,
-)
-from gensig.driveline.side_by_side.line_records import LineSignals, simulate_lines
 from gensig.driveline.teeth import (
     MeshHeat,
     ToothLaw,
@@ -64,11 +58,15 @@ from gensig.driveline.teeth import (
     start_of,
     tooth_table,
 )
-from gensig.driveline.time.newmark import LineMotion, LineSolver
+from gensig.driveline.time.newmark import LineSolver
+from gensig.driveline.time.newmark_records import (
+    SETTLING,
+    line_motion,
+    newmark_record,
+)
 from gensig.dynamics.backends.base import MOST_PAIRS
 from gensig.dynamics.backends.registry import EXPLICIT_BACKEND
-from gensig.dynamics.integrator import check_memory
-from gensig.dynamics.mesh_state import MeshState
+from gensig.dynamics.integrator import check_memory, require_step
 from gensig.dynamics.pair import Body
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.base import Fault
@@ -83,6 +81,7 @@ from gensig.sensing.manufacturing import perfect_specimen
 from gensig.sensing.toothed_wheel import draw_wheel
 from gensig.systems.base import Machine, MachineMesh, home_meshes, specimen_table
 from gensig.systems.run import CleanRecord, Run, Start, angle_from_tooth_0
+from gensig.systems.side_by_side import simulate_side_by_side
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.stiffness_curves import StiffnessCurves, stiffness_curves
 from gensig.systems.supports import supports_in_gearbox
@@ -90,8 +89,6 @@ from gensig.units import SPEED
 
 Array = NDArray[np.float64]
 
-# s before a record, until the start from the linear vibration has died away
-SETTLING = 0.3
 MOST_ENERGY_RESIDUAL = 1e-3
 
 
@@ -367,8 +364,50 @@ class LineMachine(Machine):
         )
         line = machine.line(Run(system=machine, faults=()))
         force = "mesh_force", machine.mesh_number
-        motion, angle = machine._integrate(line, loads.SECONDS, [force])
+        motion, angle = line_motion(machine, line, loads.SECONDS, [force])
         return angle, motion.signals[force]
+
+    def felt(self, number: int, faults: Sequence[Fault]) -> tuple[Fault, ...]:
+        """As ``Machine.felt``."""
+        return felt_there(self.engine.drive, self.mesh_number, number, faults)
+
+    def ready(self, run: Run[Self]) -> RunningLine:
+        """As ``Machine.ready``; its first angle is that of the followed mesh's driving gear.
+
+        Where the run asks for the loads of the teeth, it has the angles of all driving gears.
+        """
+        running, line = self.line(run), self.engine.drive.line
+        for number, mesh in enumerate(running.dynamics.system.meshes):
+            if number not in running.teeth:
+                raise SimulationError(
+                    "solver.backend = nystroem takes meshes of tabulated teeth, but mesh "
+                    f"{mesh.name} has none; take solver.backend=newmark"
+                )
+        turned = [self.driving_node, *(w.node for w in self.engine.wheels.values())]
+        if run.with_mesh_state:
+            nodes = [line.gears[mesh.driving].node for mesh in line.meshes]
+            turned += [self.engine.drive.numbers[node] for node in nodes]
+        running = running.with_angles(turned)
+        require_step(running.dynamics, self.solver, self.sensing.sampling_rate)
+        return running
+
+    def integrated(self, running: RunningLine) -> tuple[str, ...]:
+        """As ``Machine.integrated``.
+
+        A line without an acceleration has one all the same, by which its steps are checked.
+        """
+        dynamics = running.dynamics
+        kinds = self.signals(running)
+        dofs = [dof for kind, dof in kinds if kind == "acceleration"]
+        return tuple(dynamics.dofs[dof] for dof in dofs or dynamics.system.angles[:1])
+
+    def sensed(
+        self, run: Run[Self], running: RunningLine, acceleration: Array, angle: Array
+    ) -> Array:
+        """As ``Machine.sensed``."""
+        dofs, rate = self.integrated(running), self.sensing.sampling_rate
+        motion = line_signals(running.dynamics, dofs, acceleration, angle, rate)
+        return channel_rows(run, running, motion, self.mesh_number)
 
     @classmethod
     def simulate_runs(
@@ -377,59 +416,15 @@ class LineMachine(Machine):
         """Simulate runs side by side or one after the other, as their solver says."""
         results: dict[int, CleanRecord | SimulationError] = {}
         together = [n for n, run in enumerate(runs) if run.system.side_by_side]
-        records = simulate_lines([runs[n] for n in together])
+        records = simulate_side_by_side([runs[n] for n in together])
         results.update(zip(together, records, strict=True))
         for number, run in enumerate(runs):
             if number not in results:
                 try:
-                    results[number] = run.system._record(run)
+                    results[number] = newmark_record(run)
                 except SimulationError as error:
                     results[number] = error
         return [results[number] for number in range(len(runs))]
-
-    @single_thread
-    def _record(self, run: Run[LineMachine]) -> CleanRecord:
-        line = self.line(run)
-        kinds = self.signals(line)
-        if run.with_mesh_state:
-            kinds += angle_channels(line)
-        motion, angle = self._integrate(
-            line, self.operating.duration, kinds, with_pairs=run.with_mesh_state
-        )
-        turned = float(angle[-1] - angle[0])
-        mesh: MeshState | None = None
-        further: tuple[MeshState, ...] = ()
-        if run.with_mesh_state:
-            mesh, further = line_mesh_states(run, line, motion)
-        return CleanRecord(
-            acceleration=self.rows(run, line, motion),
-            shaft_angle=angle,
-            mean_speed=turned * self.sensing.sampling_rate / max(len(angle) - 1, 1),
-            contact_loss_fraction=float(motion.contact_loss[self.mesh_number]),
-            integration_error=motion.energy_residual,
-            integration_check="energy",
-            mesh=mesh,
-            further_meshes=further,
-        )
-
-    def _integrate(
-        self,
-        line: RunningLine,
-        duration: float,
-        channels: list[tuple[str, int]],
-        *,
-        with_pairs: bool = False,
-    ) -> tuple[LineMotion, Array]:
-        """Motion of a line, and the angle of the driving gear's shaft, (sample,) rad."""
-        shaft = "angle", line.dof(self.driving_node)
-        motion = line.run(
-            self.line_solver,
-            duration=duration,
-            channels=list(dict.fromkeys([*channels, shaft])),
-            settling=SETTLING,
-            with_pairs=with_pairs,
-        )
-        return motion, self.ratio * motion.nominal_angle + motion.signals[shaft]
 
     def line(self, run: Run[LineMachine]) -> RunningLine:
         """The line of one run, ready to be integrated."""
@@ -492,9 +487,3 @@ class LineMachine(Machine):
         """Signals of the integration for the channels, see ``channel``."""
         followed, names = self.mesh_number, self.sensing.channels
         return [channel(line, followed, name) for name in names]
-
-    def rows(
-        self, run: Run[Self], line: RunningLine, motion: LineMotion | LineSignals
-    ) -> Array:
-        """Signals of the channels with the gains of a run's gearbox, (channel, sample)."""
-        return channel_rows(run, line, motion, self.mesh_number)

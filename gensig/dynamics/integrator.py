@@ -99,11 +99,11 @@ def integrate(
     Raises
     ------
     ConfigError        for a channel that the machines do not have
-    SimulationError    for a machine that ``check_machine`` refuses
+    SimulationError    for a machine that ``require_step`` refuses
     """
     check_channels(channels, machines[0].dofs)
     for machine in machines:
-        check_machine(machine, solver, sampling_rate)
+        require_step(machine, solver, sampling_rate)
     integration = Integration(
         sampling_rate=sampling_rate,
         duration=duration,
@@ -124,10 +124,14 @@ def records_together(solver: Solver) -> int:
 
 
 def check_machine(dynamics: Dynamics, solver: Solver, sampling_rate: float) -> None:
-    """Raise SimulationError for a machine that the backend cannot integrate at this step.
+    """As ``require_step``; warns of a coarse step whose error is not looked at."""
+    require_step(dynamics, solver, sampling_rate)
+    if solver.backend == EXPLICIT_BACKEND and solver.max_error is None:
+        warn_of_coarse_step(dynamics, sampling_rate, solver.oversampling)
 
-    Warns of a coarse step whose error is not looked at.
-    """
+
+def require_step(dynamics: Dynamics, solver: Solver, sampling_rate: float) -> None:
+    """Raise SimulationError for a machine that the backend cannot integrate at this step."""
     if solver.backend == IMPLICIT_BACKEND:
         raise SimulationError(
             f"solver.backend = {IMPLICIT_BACKEND} integrates drive lines; for a gear pair take "
@@ -135,8 +139,6 @@ def check_machine(dynamics: Dynamics, solver: Solver, sampling_rate: float) -> N
         )
     per_sample = solver.oversampling
     BACKENDS[solver.backend].check_step(dynamics, sampling_rate, per_sample)
-    if solver.backend == EXPLICIT_BACKEND and solver.max_error is None:
-        warn_of_coarse_step(dynamics, sampling_rate, per_sample)
 
 
 def check_memory(

@@ -8,12 +8,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.integrator import Solver
+from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.dynamics.pair import Body
 from gensig.dynamics.response import LinearMachine
 from gensig.errors import SimulationError
@@ -81,6 +82,14 @@ def further_gears(
         for name, gear in gears.items()
         if not meshes[homes[name]].followed
     )
+
+
+class Running(Protocol):
+    """The machine of a run, ready to be integrated."""
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """The machine in motion; its first angle is that of the pinion."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,6 +259,33 @@ class Machine(ABC):
     @abstractmethod
     def linear_machine(self, run: Run[Self]) -> LinearMachine:
         """The healthy machine of a run, in its gearbox, as nuisances meet it."""
+
+    @abstractmethod
+    def felt(self, number: int, faults: Sequence[Fault]) -> tuple[Fault, ...]:
+        """Faults of gears as a mesh feels them, named by its sides."""
+
+    @abstractmethod
+    def ready(self, run: Run[Self]) -> Running:
+        """The machine of a run, ready to be integrated.
+
+        Raises
+        ------
+        SimulationError    for one that the method of the solver cannot integrate
+        """
+
+    @abstractmethod
+    def integrated(self, running: Any) -> tuple[str, ...]:
+        """Degrees of freedom of ``ready`` whose accelerations the channels need."""
+
+    @abstractmethod
+    def sensed(
+        self, run: Run[Self], running: Any, acceleration: Array, angle: Array
+    ) -> Array:
+        """Signals of the channels with the gains of a run's gearbox, (channel, sample).
+
+        ``acceleration`` (dof, sample) is that of ``integrated`` and may be overwritten, ``angle``
+        (angle, sample) rad.
+        """
 
     @abstractmethod
     def check(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -27,50 +27,9 @@ from gensig.units import from_si
 
 Array = NDArray[np.float64]
 MachineT = TypeVar("MachineT", bound=Machine)
-DynamicsT = TypeVar("DynamicsT")
 
 # steps per sample above which bouncing records do not converge further
 FINEST_BOUNCING = 20
-
-
-def records_by_kind(
-    runs: Sequence[Run[MachineT]],
-    *,
-    dynamics_of: Callable[[Run[MachineT]], DynamicsT],
-    kind_of: Callable[[Run[MachineT], DynamicsT], Hashable],
-    integrate: Callable[
-        [Sequence[Run[MachineT]], Sequence[DynamicsT]],
-        list[CleanRecord | SimulationError],
-    ],
-) -> list[CleanRecord | SimulationError]:
-    """Records of runs, in the order of the runs; runs of one kind are integrated in one call.
-
-    A run whose motion cannot be integrated gives its error in place of its record. Records that
-    are too coarse are made again.
-    """
-    results: dict[int, CleanRecord | SimulationError] = {}
-    machines: dict[int, DynamicsT] = {}
-    kinds: dict[Hashable, list[int]] = {}
-    for index, run in enumerate(runs):
-        try:
-            machines[index] = dynamics_of(run)
-        except SimulationError as error:
-            results[index] = error
-        else:
-            kinds.setdefault(kind_of(run, machines[index]), []).append(index)
-    for same in kinds.values():
-        records = integrate([runs[i] for i in same], [machines[i] for i in same])
-        results.update(zip(same, records, strict=True))
-    coarse = [i for i, record in results.items() if is_too_coarse(runs[i], record)]
-    if coarse:
-        again = records_by_kind(
-            [finer(runs[i]) for i in coarse],
-            dynamics_of=dynamics_of,
-            kind_of=kind_of,
-            integrate=integrate,
-        )
-        results.update(zip(coarse, again, strict=True))
-    return [results[index] for index in range(len(runs))]
 
 
 def checks(

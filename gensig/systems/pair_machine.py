@@ -16,9 +16,7 @@ from gensig.dynamics.integrator import (
     check_channels,
     check_machine,
     check_memory,
-    integrate,
 )
-from gensig.dynamics.mesh_state import mesh_state
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.pair import PAIR_DOFS, Body, Rotor, RunningPair
 from gensig.dynamics.response import LinearPair
@@ -43,11 +41,9 @@ from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
 from gensig.systems.base import Machine, MachineMesh, simulate_together, specimen_table
 from gensig.systems.integration_checks import (
     check_steps,
-    checks,
-    not_finite,
-    records_by_kind,
 )
 from gensig.systems.run import CleanRecord, Run, Start, angle_from_tooth_0
+from gensig.systems.side_by_side import simulate_side_by_side
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.stiffness_curves import (
     StiffnessCurves,
@@ -310,6 +306,28 @@ class GearPairMachine(Machine):
         """The healthy pair in the gearbox of a run."""
         return LinearPair(running=running_pair(replace(run, faults=(), specimen=None)))
 
+    def felt(self, number: int, faults: Sequence[Fault]) -> tuple[Fault, ...]:
+        """All faults: both gears are in the one mesh."""
+        return tuple(faults)
+
+    def ready(self, run: Run[Self]) -> RunningPair:
+        """As ``Machine.ready``; warns of a coarse step whose error is not looked at."""
+        running = running_pair(run)
+        check_machine(running.dynamics, self.solver, self.sensing.sampling_rate)
+        return running
+
+    def integrated(self, running: RunningPair) -> tuple[str, ...]:
+        """The channels: all are motions of the pair."""
+        return self.sensing.channels
+
+    def sensed(
+        self, run: Run[Self], running: RunningPair, acceleration: Array, angle: Array
+    ) -> Array:
+        """As ``Machine.sensed``."""
+        if run.gearbox is not None:
+            acceleration *= run.gearbox.gain[:, None]
+        return acceleration
+
     def check(self) -> None:
         """Raise for errors of every record: drive, fits out of range, channels, step length."""
         self.require_drive()
@@ -329,7 +347,7 @@ class GearPairMachine(Machine):
         cls, runs: Sequence[Run[Self]]
     ) -> list[CleanRecord | SimulationError]:
         """Records of runs; those that share rate, duration and law are simulated side by side."""
-        return simulate_pairs(runs)
+        return simulate_side_by_side(runs)
 
 
 def _tip_relief(
@@ -394,80 +412,3 @@ def running_pair(run: PairRun) -> RunningPair:
         motor=machine.motor,
         load=machine.load,
     )
-
-
-def _kind(run: PairRun, _: RunningPair) -> tuple[object, ...]:
-    """All values that runs must share to be integrated in one call."""
-    system = run.system
-    return (
-        system.sensing.sampling_rate,
-        system.sensing.channels,
-        system.operating.duration,
-        system.has_whole_teeth,
-        system.motor is None,
-        system.load is None,
-        system.operating.is_steady,
-        run.with_mesh_state,
-        system.solver,
-        system.mesh.law,
-        system.mesh.roll_torque,
-        system.mesh.phase,
-    )
-
-
-def simulate_pairs(runs: Sequence[PairRun]) -> list[CleanRecord | SimulationError]:
-    """Records of runs, in the order of the runs.
-
-    Runs that share rate, duration and law are integrated in one call. The bits of a record do not
-    depend on the other runs. A motion that does not stay finite gives its error in place of its
-    record.
-    """
-    return records_by_kind(
-        runs, dynamics_of=_checked_pair, kind_of=_kind, integrate=_side_by_side
-    )
-
-
-def _checked_pair(run: PairRun) -> RunningPair:
-    running, system = running_pair(run), run.system
-    check_machine(running.dynamics, system.solver, system.sensing.sampling_rate)
-    return running
-
-
-def _side_by_side(
-    runs: Sequence[PairRun], pairs: Sequence[RunningPair]
-) -> list[CleanRecord | SimulationError]:
-    system = runs[0].system
-    rate = system.sensing.sampling_rate
-    motions = integrate(
-        [pair.dynamics for pair in pairs],
-        system.solver,
-        sampling_rate=rate,
-        duration=system.operating.duration,
-        channels=system.sensing.channels,
-        with_mesh_state=runs[0].with_mesh_state,
-    )
-    errors, verdicts = checks(motions, system.solver, rate)
-    records: list[CleanRecord | SimulationError] = []
-    for index, run in enumerate(runs):
-        if not motions.finite[index]:
-            records.append(not_finite(run, [pairs[index].teeth]))
-            continue
-        acceleration, angle = motions.acceleration[index], motions.angle[index][0]
-        if run.gearbox is not None:
-            acceleration *= run.gearbox.gain[:, None]
-        mesh = None
-        if run.with_mesh_state:
-            faulty = faulty_teeth(run.system.pair, run.faults)
-            mesh = mesh_state(pairs[index].teeth, motions.seen[index], angle, faulty)
-        records.append(
-            CleanRecord(
-                acceleration=acceleration,
-                shaft_angle=angle,
-                mean_speed=float(motions.mean_speed[index]),
-                contact_loss_fraction=float(motions.contact_loss[index, 0]),
-                integration_error=float(errors[index]),
-                integration_check=verdicts[index],
-                mesh=mesh,
-            )
-        )
-    return records

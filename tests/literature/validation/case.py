@@ -10,7 +10,6 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.pair import RunningPair
 from gensig.errors import ConfigError
 from gensig.faults.base import Fault, faulty_teeth
@@ -22,8 +21,9 @@ from gensig.mesh.pair_table import pair_table
 from gensig.mesh.tooth_table import ToothTable
 from gensig.options.compose import compose
 from gensig.options.configuration import Configuration
-from gensig.systems.pair_machine import GearPairMachine
+from gensig.systems.pair_machine import GearPairMachine, running_pair
 from gensig.systems.registry import read_system
+from gensig.systems.run import Run
 
 Array = NDArray[np.float64]
 
@@ -176,17 +176,9 @@ def with_words(case: Case, *words: str) -> Case:
     return read_case((*case.overrides, *words))
 
 
-def running_pair(case: Case) -> RunningPair:
-    """The equations of motion with perfect teeth."""
-    system = case.system
-    return RunningPair(
-        teeth=MeshTeeth.perfect(case.table),
-        pinion=system.pinion,
-        wheel=system.wheel,
-        motor=system.motor,
-        load=system.load,
-        operating=system.operating,
-    )
+def running(case: Case) -> RunningPair:
+    """The pair in motion with perfect teeth."""
+    return running_pair(Run(system=case.system, faults=case.faults))
 
 
 @lru_cache(maxsize=64)

@@ -17,7 +17,6 @@ from side_by_side_lines import (
 )
 
 from gensig.driveline.reading import read_line_machine
-from gensig.driveline.side_by_side import line_records
 from gensig.dynamics.decimation import in_band_error
 from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
@@ -351,7 +350,7 @@ def test_too_long_steps_are_refused_with_the_motion_that_decides_it(two_stage):
     found = re.search(
         r"the stiffest motion, (.*) at \d+ Hz; .* to at least (\d+)$", str(error)
     )
-    assert found[1] in line_records.running_line_of(run_of(slow)).dynamics.dofs
+    assert found[1] in two_stage.ready(run_of(two_stage)).dynamics.dofs
     assert int(found[2]) > two_stage.solver.oversampling
 
 

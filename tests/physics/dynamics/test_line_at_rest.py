@@ -7,7 +7,6 @@ import pytest
 from lane_tools import law_of, on_any_bodies
 from numpy.testing import assert_allclose
 
-from gensig.driveline.side_by_side.line_records import running_line_of
 from gensig.dynamics.motion.at_rest import at_rest as found_at_rest
 from gensig.operation.options import read_operating
 from gensig.plan.make import make_plan
@@ -31,7 +30,8 @@ def line(request):
     """One of the lines, its gears with the errors of their grade."""
     config = read_request([*LINES[request.param], *FEW]).config
     record = make_plan(config).record(3)
-    return running_line_of(InputReader(config).inputs(record).run).dynamics
+    run = InputReader(config).inputs(record).run
+    return run.system.ready(run).dynamics
 
 
 def at_rest(dynamics, system, force):

@@ -89,10 +89,10 @@ def test_rates_of_an_oscillator():
     ids=["pair", "rotors"],
 )
 @pytest.mark.parametrize("name", ["stiffness", "damping"])
-def test_a_group_holds_the_matrices_of_each_machine(machine, running_of, kinds, name):
+def test_a_group_holds_the_matrices_of_each_machine(machine, dynamics_of, kinds, name):
     """Also where a machine lacks an entry of its neighbour; empty lanes repeat the first."""
-    machines = [running_of(machine(changes)) for changes in kinds]
-    group = pack([each.dynamics for each in machines], 1e-6)
+    machines = [dynamics_of(machine(changes)) for changes in kinds]
+    group = pack(machines, 1e-6)
     n = len(machines[0].dofs)
 
     row, column = group.coupled.reshape(-1, 2).T

@@ -13,11 +13,9 @@ from core_runs import MISSING, CoreRun
 from side_by_side_lines import run_of
 
 from gensig.driveline.reading import read_line_machine
-from gensig.driveline.side_by_side import line_records
 from gensig.dynamics import _written
 from gensig.dynamics._vector import EIGHT, n_lanes
 from gensig.plan.request import read_request
-from gensig.systems.pair_machine import running_pair
 from gensig.systems.registry import read_system
 
 STEP, N_STEPS = 1.0 / (51200 * 5), 60
@@ -28,12 +26,10 @@ CASES = {
     "pair": (
         ["experiment=quickstart", RAMP],
         read_system,
-        lambda run: running_pair(run).dynamics,
     ),
     "two_stage": (
         ["experiment=two_stage", RIPPLE],
         read_line_machine,
-        lambda run: line_records.running_line_of(run).dynamics,
     ),
 }
 
@@ -98,11 +94,11 @@ def plain(monkeypatch, core):
 
 def machines(kind):
     """A machine with a missing tooth and one under a light load, whose teeth part."""
-    words, read, dynamics_of = CASES[kind]
+    words, read = CASES[kind]
     machine = read(read_request(words).config)
     light = replace(machine.operating, torque=0.1 * machine.operating.torque)
     runs = run_of(machine, MISSING), run_of(replace(machine, operating=light))
-    return list(map(dynamics_of, runs))
+    return [run.system.ready(run).dynamics for run in runs]
 
 
 @pytest.mark.parametrize("kind", CASES)

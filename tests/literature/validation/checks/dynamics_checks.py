@@ -21,7 +21,7 @@ from validation.case import (
     Array,
     Case,
     record,
-    running_pair,
+    running,
     with_fault,
     with_words,
 )
@@ -148,15 +148,13 @@ def _natural_frequency(case: Case, at: str) -> float:
     counted.
     """
     stiffness, mode = at.split()
-    running = running_pair(case)
-    system = running.equations
-    direction = running.approach_direction()
+    pair = running(case)
+    system = pair.equations
+    direction = pair.approach_direction()
     matrix = system.governed_stiffness + float(stiffness) * np.outer(
         direction, direction
     )
-    along = [
-        index for index, name in enumerate(running.dofs) if not name.endswith("_x")
-    ]
+    along = [index for index, name in enumerate(pair.dofs) if not name.endswith("_x")]
     reduced = matrix[np.ix_(along, along)] / system.mass[along][:, None]
     frequency = np.sqrt(np.sort(np.abs(np.linalg.eigvals(reduced)))) / (2.0 * np.pi)
     return float(frequency[int(mode)])
@@ -164,8 +162,8 @@ def _natural_frequency(case: Case, at: str) -> float:
 
 def _support_frequency(case: Case, at: str) -> float:
     """Undamped frequency in Hz of one gear on its own support; ``at`` is its degree of freedom."""
-    running = running_pair(case)
-    system, index = running.equations, running.dofs.index(at)
+    pair = running(case)
+    system, index = pair.equations, pair.dofs.index(at)
     return float(
         np.sqrt(system.governed_stiffness[index, index] / system.mass[index])
         / (2.0 * np.pi)

@@ -16,7 +16,7 @@ from gensig.geometry.tooth_profile import (
     root_curve_point,
     tooth_profile,
 )
-from validation.case import Case, running_pair
+from validation.case import Case, running
 
 Check = Callable[[Case, str], float]
 
@@ -128,6 +128,6 @@ GEOMETRY: dict[str, Check] = {
     "pinion_curvature": lambda case, at: float(case.curvature("pinion", at)[0]),
     "corner_gap": _corner_gap,
     "smaller_corner_gap": _smaller_corner_gap,
-    "mesh_frequency": lambda case, at: running_pair(case).mesh_frequency,
+    "mesh_frequency": lambda case, at: running(case).mesh_frequency,
     "wheel_speed": lambda case, at: case.system.operating.speed / case.pair.ratio,
 }

@@ -1,1 +1,0 @@
-"""Drive lines of spur gears in the two-evaluation core, several records side by side."""
