@@ -84,4 +84,4 @@ def solved(
 
 def at_rest(dynamics: Dynamics, time: float = 0.0) -> np.ndarray:
     """State of a machine at rest in static equilibrium at a time."""
-    return np.concatenate([dynamics.static_start(time), np.zeros(6)])
+    return np.concatenate(dynamics.start(time))

@@ -91,9 +91,8 @@ def velocities_of_the_core(running, step, oversampling, n_samples):
 
 def velocities_of_the_reference(running, step, oversampling, n_samples):
     """The same by ``benchmarks._classical_scheme``."""
-    start = running.dynamics.static_start(0.0)
-    still = np.zeros(len(start))
-    _, v = trajectory(running, start, still, step, n_samples * oversampling)
+    start = running.dynamics.start(0.0)
+    _, v = trajectory(running, *start, step, n_samples * oversampling)
     return v[::oversampling]
 
 

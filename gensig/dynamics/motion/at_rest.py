@@ -45,7 +45,10 @@ def at_rest(
     sense = np.where([mesh.mean_force < 0.0 for mesh in system.meshes], -1.0, 1.0)
     carried, q = sense * mean, np.zeros(n)
     # mesh forces as deflections of the mean stiffness, so that all rows are of one size
-    pushed = scale[:, None] * reach
+    matrix = np.zeros((n + len(reach), n + len(reach)))
+    matrix[:n, :n], matrix[n:, :n] = stiffness, scale[:, None] * reach
+    matrix[:n, n:] = matrix[n:, :n].T
+    yielding = np.arange(n, len(matrix))
     for _ in range(ROUNDS):
         turned = system.rotation * angle + q
         meshes = zip(system.meshes, carried, scale, strict=True)
@@ -54,9 +57,7 @@ def at_rest(
             for mesh, load, at_work in meshes
         ]
         approach, tangent = np.array(states).T
-        matrix = np.block(
-            [[stiffness, pushed.T], [pushed, -np.diag(scale**2 / tangent)]]
-        )
+        matrix[yielding, yielding] = -(scale**2) / tangent
         right = np.concatenate([force, scale * (approach - carried / tangent)])
         solution = np.linalg.solve(matrix, right)
         before, q = q, solution[:n]

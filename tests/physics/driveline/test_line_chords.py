@@ -162,11 +162,10 @@ class TestZeroHelix:
 
 
 def moved(line):
-    start = line.static_start(0.0), np.zeros(len(line.dofs))
     n_steps = STEPS * N_SAMPLES
     return state_after(
         line,
-        start,
+        line.start(0.0),
         n_steps / (51200 * STEPS),
         n_steps,
     )
@@ -198,13 +197,9 @@ class TestAgainstThePair:
 
     def test_the_same_motion(self, running):
         q_1, v_1, motion = moved(running.dynamics)
-        start = (
-            running.dynamics.static_start(0.0),
-            np.zeros(len(running.dofs)),
-        )
         q, v, _ = advance(
             running,
-            *start,
+            *running.dynamics.start(0.0),
             1 / (51200 * STEPS),
             0,
             STEPS * N_SAMPLES,

@@ -45,7 +45,7 @@ class TestRippledMesh:
             torques=constant_torques([200.0, -400.0]),
             nominal=constant_speed(400.0),
         )
-        start = line.static_start(0.0), np.zeros(2)
+        start = line.start(0.0)
         return lambda n_steps: state_after(line, start, 0.02, n_steps)
 
     def test_order_two(self, run):
@@ -164,7 +164,7 @@ class TestAgainstThePair:
         return running_of(pair, faults, **errors)
 
     def test_the_same_motion(self, running):
-        start = (running.dynamics.static_start(0.0), np.zeros(6))
+        start = running.dynamics.start(0.0)
         n_steps = self.STEPS * self.N_SAMPLES
         step = 1 / (51200 * self.STEPS)
         q, v, _ = advance(running, *start, step, 0, n_steps)

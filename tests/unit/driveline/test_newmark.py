@@ -110,6 +110,11 @@ class TestCourse:
         assert speed == pytest.approx([10.0, 10.0, 20.0, 25.0, 30.0])
         assert angle == pytest.approx([-35.0, -15.0, 0.0, 11.25, 55.0])
 
+    def test_a_set_point_that_changes_has_no_knots(self, dynamics_of, machine):
+        line = dynamics_of(machine({"operating.speed_profile": [[0, 1], [1, 2]]}))
+        with refused(ConfigError, "changes all the time; take solver.backend=nystroem"):
+            integrate_line(line, SOLVER, duration=0.01, channels=[("speed", 0)])
+
 
 class TestTorques:
     @pytest.mark.parametrize(
