@@ -27,7 +27,7 @@ from gensig.driveline.line_gears import (
     pinion_turns,
     with_supports,
 )
-from gensig.driveline.linear.linear_drive_line import LinearDriveLine
+from gensig.driveline.linear.linear_drive_line import linear_line
 from gensig.driveline.machine_checks import (
     check_sensing,
     check_solver,
@@ -68,6 +68,7 @@ from gensig.dynamics.backends.base import MOST_PAIRS
 from gensig.dynamics.backends.registry import EXPLICIT_BACKEND
 from gensig.dynamics.integrator import check_memory, require_step
 from gensig.dynamics.pair import Body
+from gensig.dynamics.response import LinearMachine
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.base import Fault
 from gensig.geometry.contact import SIDES, GearPair
@@ -313,18 +314,13 @@ class LineMachine(Machine):
         """Angle of the crank or the motor, rad."""
         return self.crank_angle(start)
 
-    def linear_machine(self, run: Run[Self]) -> LinearDriveLine:
+    def linear_machine(self, run: Run[Self]) -> LinearMachine:
         """The healthy line in the gearbox of a run, at the set-point."""
         speed, torque = self.operating.speed / self.ratio, self.operating.torque
         running = running_line(
             self._in_gearbox(run), steady_course(speed, torque), governor=self._governor
         )
-        return LinearDriveLine(
-            running=running,
-            followed=self.mesh_number,
-            speed=speed,
-            mesh_forces=running.mesh_force,
-        )
+        return linear_line(running, self.mesh_number, speed, self.channels)
 
     def at_gear(self, gear: str) -> tuple[Machine, str]:
         """As ``Machine.at_gear``."""

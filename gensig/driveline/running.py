@@ -14,7 +14,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.cycle import CYCLE
@@ -41,6 +40,7 @@ from gensig.dynamics.equations import (
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.motion.course import LineCourse, ShaftTorque, constant_speed
 from gensig.dynamics.motion.dynamics import Dynamics
+from gensig.dynamics.response import single_thread
 from gensig.errors import ConfigError, StepError
 from gensig.geometry.contact import GearPair
 from gensig.mesh.even_table import even_table
@@ -57,10 +57,6 @@ AFTER = 0.2  # s that a course goes on after a record: the low-pass looks ahead
 MOST_STEPS = 64  # per sample, that are tried where steps turn out to be too long
 LEAD_SAMPLES = 256  # before time 0: more than the low-pass looks back
 ROUNDED = 1e-12  # of the largest torque, below which a course of it over the cycle is constant
-
-# More threads of the linear algebra sum in another order; a line that rattles makes another
-# motion of the last digit.
-single_thread = threadpool_limits.wrap(limits=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

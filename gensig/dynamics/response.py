@@ -1,22 +1,22 @@
 """A machine as nuisances meet it: shafts of its gears, and its answer to small forces.
 
-Here are the interface and the gear pair; ``gensig.driveline.linear.linear_drive_line`` is a line.
+Of a gear pair by ``linear_pair``, of a line by ``gensig.driveline.linear.linear_drive_line``.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from gensig.dynamics.linear_system import LinearSystem
 from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.dynamics.pair import Body, RunningPair
-from gensig.units import check_choice
+from gensig.units import SPEED, check_choice
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -28,6 +28,10 @@ GEAR_AXES = ("x", "y", "rotation")
 SENSE = {"pinion": -1.0, "wheel": 1.0}
 # Of the greatest eigenvalue. Below it is rounding of motion that does not oscillate.
 LEAST_SWING = 1e-7
+
+# More threads of the linear algebra sum in another order; a line that rattles makes another
+# motion of the last digit.
+single_thread = threadpool_limits.wrap(limits=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +48,7 @@ class GearShaft:
     sense : +1 where the gear turns from its x to its y, -1 where it turns from y to x
     drives : True for a gear that drives its mesh, False for a driven one
     body : mass, inertia and support of the gear
+    dofs : degrees of freedom of the gear's x, y and rotation
     """
 
     speed: float
@@ -54,16 +59,32 @@ class GearShaft:
     sense: float
     drives: bool
     body: Body
+    dofs: tuple[int, int, int]
 
 
-class LinearMachine(ABC):
-    """A healthy machine whose meshes are held at their mean stiffness and damping."""
+@final
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LinearMachine:
+    """A healthy machine whose meshes are held at their mean stiffness and damping.
 
-    @abstractmethod
+    Parameters
+    ----------
+    system : its bodies, a spring and a damper in every mesh
+    shafts : of its gears, by their names
+    channels : degree of freedom of every channel, by its name; that of a toothed wheel answers with
+        its speed, without the errors of its teeth
+    """
+
+    system: LinearSystem
+    shafts: Mapping[str, GearShaft]
+    channels: Mapping[str, int]
+
     def shaft(self, gear: str) -> GearShaft:
         """Shaft of a gear of the machine, by its name."""
+        check_choice("gear", gear, self.shafts)
+        return self.shafts[gear]
 
-    @abstractmethod
+    @single_thread
     def accelerations(
         self, gear: str, frequency: Array, force: Complex, channels: Sequence[str]
     ) -> Complex:
@@ -78,6 +99,58 @@ class LinearMachine(ABC):
         -------
         (line, channel) in the unit of each channel, complex
         """
+        once, place = np.unique(frequency, return_inverse=True)
+        unit = np.zeros((len(once), len(self.system.mass)), dtype=np.complex128)
+        answer = np.zeros((len(frequency), len(channels)), dtype=np.complex128)
+        rows = [self.channels[name] for name in channels]
+        is_speed = np.array([name.endswith(SPEED) for name in channels])
+        for axis, dof in enumerate(self.shaft(gear).dofs):
+            unit[:] = 0.0
+            unit[:, dof] = 1.0
+            motion = self.system.response(unit, once)[:, rows]
+            rate = 1j * once[:, None] * motion
+            seen = np.where(is_speed, rate, 1j * once[:, None] * rate)
+            answer += force[:, axis, None] * seen[place]
+        return answer
+
+
+def linear_pair(running: RunningPair) -> LinearMachine:
+    """A gear pair with its mesh at its mean stiffness and damping."""
+    operating, dofs = running.operating, running.dofs
+    bodies = {"pinion": running.pinion, "wheel": running.wheel}
+    ratios = {"pinion": 1.0, "wheel": 1.0 / running.table.pair.ratio}
+    shafts = {}
+    for gear, body in bodies.items():
+        x, y, rotation = (dofs.index(f"{gear}_{axis}") for axis in GEAR_AXES)
+        shafts[gear] = GearShaft(
+            speed=ratios[gear] * operating.speed,
+            speed_ratio=ratios[gear],
+            set_ratio=ratios[gear],
+            torque=operating.torque / ratios[gear],
+            mesh_force=running.mesh_force,
+            sense=SENSE[gear],
+            drives=gear == "pinion",
+            body=body,
+            dofs=(x, y, rotation),
+        )
+    return LinearMachine(
+        system=closed_system(running.dynamics),
+        shafts=shafts,
+        channels={name: dof for dof, name in enumerate(dofs)},
+    )
+
+
+def closed_system(dynamics: Dynamics) -> LinearSystem:
+    """A machine with a spring and a damper of their mean sizes in its meshes."""
+    stiffness, damping = dynamics.equations.closed(
+        dynamics.mesh_stiffness, dynamics.mesh_damping
+    )
+    return LinearSystem(
+        mass=np.diag(dynamics.equations.mass),
+        stiffness=stiffness,
+        loss=np.zeros_like(stiffness),
+        damping=damping,
+    )
 
 
 def accelerations(dynamics: Dynamics, frequency: Array, force: Complex) -> Complex:
@@ -95,16 +168,7 @@ def accelerations(dynamics: Dynamics, frequency: Array, force: Complex) -> Compl
     Source: -w^2 (K + i w C - w^2 M)^-1 F of the linear system, K and C with k h h^T and c h h^T of
     every mesh. Assumes forces so small that teeth stay in contact at the same positions.
     """
-    stiffness, damping = dynamics.equations.closed(
-        dynamics.mesh_stiffness, dynamics.mesh_damping
-    )
-    line = LinearSystem(
-        mass=np.diag(dynamics.equations.mass),
-        stiffness=stiffness,
-        loss=np.zeros_like(stiffness),
-        damping=damping,
-    )
-    displacement = line.response(force, frequency)
+    displacement = closed_system(dynamics).response(force, frequency)
     return np.asarray(-(frequency[:, None] ** 2) * displacement)
 
 
@@ -123,38 +187,3 @@ def natural_frequencies(dynamics: Dynamics) -> tuple[Array, Array]:
     swing = swing[np.argsort(np.abs(swing), kind="stable")]
     rate = np.abs(swing)
     return rate / (2.0 * np.pi), -swing.real / rate
-
-
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LinearPair(LinearMachine):
-    """A gear pair whose mesh is held at its mean stiffness and damping."""
-
-    running: RunningPair
-
-    def shaft(self, gear: str) -> GearShaft:
-        """As ``LinearMachine.shaft``, of the pinion or the wheel."""
-        check_choice("gear", gear, SENSE)
-        running, operating, ratio = self.running, self.running.operating, 1.0
-        if gear != "pinion":
-            ratio = 1.0 / running.table.pair.ratio
-        return GearShaft(
-            speed=ratio * operating.speed,
-            speed_ratio=ratio,
-            set_ratio=ratio,
-            torque=operating.torque / ratio,
-            mesh_force=running.mesh_force,
-            sense=SENSE[gear],
-            drives=gear == "pinion",
-            body={"pinion": running.pinion, "wheel": running.wheel}[gear],
-        )
-
-    def accelerations(
-        self, gear: str, frequency: Array, force: Complex, channels: Sequence[str]
-    ) -> Complex:
-        """As ``LinearMachine.accelerations``, by ``accelerations``."""
-        dofs = self.running.dofs
-        on_dofs = np.zeros((len(frequency), len(dofs)), dtype=np.complex128)
-        on_dofs[:, [dofs.index(f"{gear}_{axis}") for axis in GEAR_AXES]] = force
-        answer = accelerations(self.running.dynamics, frequency, on_dofs)
-        return answer[:, [dofs.index(name) for name in channels]]

@@ -19,7 +19,7 @@ from gensig.dynamics.integrator import (
 )
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.pair import PAIR_DOFS, Body, Rotor, RunningPair
-from gensig.dynamics.response import LinearPair
+from gensig.dynamics.response import LinearMachine, linear_pair
 from gensig.errors import ConfigError, FaultError, GeometryError, SimulationError
 from gensig.faults.base import Fault, faulty_teeth, require_gears
 from gensig.geometry.contact import GearPair
@@ -302,9 +302,9 @@ class GearPairMachine(Machine):
         """None: the teeth say how the one mesh stands."""
         return
 
-    def linear_machine(self, run: Run[Self]) -> LinearPair:
+    def linear_machine(self, run: Run[Self]) -> LinearMachine:
         """The healthy pair in the gearbox of a run."""
-        return LinearPair(running=running_pair(replace(run, faults=(), specimen=None)))
+        return linear_pair(running_pair(replace(run, faults=(), specimen=None)))
 
     def felt(self, number: int, faults: Sequence[Fault]) -> tuple[Fault, ...]:
         """All faults: both gears are in the one mesh."""

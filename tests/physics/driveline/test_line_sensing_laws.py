@@ -186,8 +186,8 @@ def test_shafts_of_the_line_have_its_speeds_and_torques():
 def test_a_gear_turns_from_its_x_to_its_y_by_its_sense():
     """The frame of a gear in two meshes, from the approaches that its motion makes in both."""
     system = machine(*ENGINE, "system.lateral=true", "sensing.channels=[pinion_y]")
-    answering, drive = linear(system), system.engine.drive
-    directions = answering.running.matrices.directions
+    drive = system.engine.drive
+    directions = drive.matrices(merge_rigid=True).directions
     first = directions.shape[1] - 2 * len(drive.line.gears)
     checked = 0
     for number, name in enumerate(system.engine.drive.line.gears):

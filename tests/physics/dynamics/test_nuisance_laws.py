@@ -7,7 +7,7 @@ import pytest
 from closeness import assert_close
 from scipy.signal import lsim
 
-from gensig.dynamics.response import SENSE, LinearPair, accelerations
+from gensig.dynamics.response import SENSE, accelerations, linear_pair
 from gensig.operation.setpoint import Profile
 from gensig.sensing.nuisance import draw_tones, read_nuisances
 from gensig.sensing.tones import Tones
@@ -46,7 +46,7 @@ def tones_of(run, part):
     units = {"gearbox": rng[0], "specimen": rng[1]}
     return draw_tones(
         read_nuisances([part]),
-        LinearPair(running=running_pair(run)),
+        linear_pair(running_pair(run)),
         units,
         rng[2],
     )
@@ -56,7 +56,7 @@ def response(run, tones, angle=None):
     """Accelerations of the channels; by default at the nominal angle of the run."""
     if angle is None:
         angle = run.system.operating.nominal(TIMES).angle
-    machine = LinearPair(running=running_pair(run))
+    machine = linear_pair(running_pair(run))
     return nuisance_acceleration(run, machine, tones, angle)
 
 

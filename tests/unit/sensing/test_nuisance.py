@@ -9,7 +9,7 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from sensing_groups import MACHINE
 
-from gensig.dynamics.response import LinearPair
+from gensig.dynamics.response import linear_pair
 from gensig.errors import ConfigError
 from gensig.sensing.bearing_waviness import bearing_orders
 from gensig.sensing.nuisance import KINDS, draw_tones, read_nuisances
@@ -67,7 +67,7 @@ def draw(running):
         nuisances = read_nuisances(list(parts))
         return draw_tones(
             nuisances,
-            LinearPair(running=running),
+            linear_pair(running),
             units,
             default_rng([2, record]),
         )
