@@ -37,10 +37,10 @@ from gensig.dynamics.equations import (
     Equations,
     Mesh,
 )
+from gensig.dynamics.linear_system import single_thread
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.motion.course import LineCourse, ShaftTorque, constant_speed
 from gensig.dynamics.motion.dynamics import Dynamics
-from gensig.dynamics.response import single_thread
 from gensig.errors import ConfigError, StepError
 from gensig.geometry.contact import GearPair
 from gensig.mesh.even_table import even_table

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from gensig.errors import SimulationError
 
@@ -13,6 +14,10 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 ASYMMETRIC = 1e-9
+
+# More threads of the linear algebra sum in another order; a line that rattles makes another
+# motion of the last digit.
+single_thread = threadpool_limits.wrap(limits=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

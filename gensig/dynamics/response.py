@@ -11,9 +11,8 @@ from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
-from gensig.dynamics.linear_system import LinearSystem
+from gensig.dynamics.linear_system import LinearSystem, single_thread
 from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.dynamics.pair import Body, RunningPair
 from gensig.units import SPEED, check_choice
@@ -28,10 +27,6 @@ GEAR_AXES = ("x", "y", "rotation")
 SENSE = {"pinion": -1.0, "wheel": 1.0}
 # Of the greatest eigenvalue. Below it is rounding of motion that does not oscillate.
 LEAST_SWING = 1e-7
-
-# More threads of the linear algebra sum in another order; a line that rattles makes another
-# motion of the last digit.
-single_thread = threadpool_limits.wrap(limits=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,8 +11,8 @@ from gensig.driveline.channels import channel_rows
 from gensig.driveline.running import RunningLine
 from gensig.driveline.time.newmark import LineMotion
 from gensig.dynamics.backends.base import SEEN_FORCE
+from gensig.dynamics.linear_system import single_thread
 from gensig.dynamics.mesh_state import MeshState, mesh_state
-from gensig.dynamics.response import single_thread
 from gensig.faults.base import faulty_teeth
 from gensig.systems.run import CleanRecord, Run
 

@@ -26,7 +26,7 @@ class Turning(NamedTuple):
 
 
 class Course(ABC):
-    """Nominal rotation of the reference over time, and what torques are then of what they are set.
+    """Nominal rotation of the reference over time, and shares of the set torques.
 
     Time 0 is the first sample of a record.
     """
@@ -54,14 +54,14 @@ class Course(ABC):
 
     @abstractmethod
     def share(self, factor: Array | None, times: Array) -> Array:
-        """Share that a torque has of what it is set, at times in s, (time,).
+        """Share of its set size that a torque has at times in s, (time,).
 
-        ``factor`` (knot,) is that torque's own, None where it has none.
+        ``factor`` (knot,) is its own; None for a torque without one.
         """
 
     @abstractmethod
     def with_knots(self) -> LineCourse:
-        """The same as a course that goes straight between knots; ConfigError where it has none."""
+        """The course as one that is straight between knots; ConfigError where it is not."""
 
 
 @final

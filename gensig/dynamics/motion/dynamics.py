@@ -49,7 +49,7 @@ class Dynamics:
     system : bodies, springs and meshes; torques over an angle follow from ``torques``
     nominal : rotation of the reference
     friction_torque : (dof,) N m    what the drive gives to make up for the mean friction of the
-        meshes; statics know neither
+        meshes; statics leave out both
     reference_force : (mesh,) N    at which contact and damping of the meshes are taken
     vibration : steady vibration at the first speed if no mesh parts; None for none
     turned : rad    angle of the reference in its cycle at time 0
