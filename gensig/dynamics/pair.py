@@ -242,7 +242,8 @@ class RunningPair:
         Action and reaction on both gears, mesh force driving the wheel:
         ``docs/theory/spur_dynamics.md``. The soft speed source is not among the springs.
         """
-        gears = ("pinion", self.pinion, 1.0), ("wheel", self.wheel, self._wheel_speed)
+        wheel_speed = 1.0 / self.table.pair.ratio
+        gears = ("pinion", self.pinion, 1.0), ("wheel", self.wheel, wheel_speed)
         plane = [motion for gear in gears for motion in _in_plane(*gear)]
         springs = [
             *_supports(PINION_X, self.pinion.support),
@@ -264,10 +265,6 @@ class RunningPair:
                 damping = rotor.coupling_damping(turning.inertia)
                 springs.append(Spring(dof, gear, rotor.coupling_stiffness, damping))
         return Bodies(motions=tuple(plane), springs=tuple(springs))
-
-    @property
-    def _wheel_speed(self) -> float:
-        return 1.0 / self.table.pair.ratio
 
     @cached_property
     def dynamics(self) -> Dynamics:

@@ -329,7 +329,7 @@ class GearPairMachine(Machine):
         return acceleration
 
     def check(self) -> None:
-        """Raise for errors of every record: drive, fits out of range, channels, step length."""
+        """Raise for errors of every record: drive, fits, channels, step length, rest."""
         self.require_drive()
         self.mesh_table()
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
@@ -341,6 +341,7 @@ class GearPairMachine(Machine):
         sensing.check_gears(self.gears)
         sensing.check(operating.duration)
         check_steps(nominal.dynamics, self.solver, rate)
+        nominal.dynamics.check_rest()
 
     @classmethod
     def simulate_runs(

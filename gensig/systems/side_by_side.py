@@ -36,7 +36,7 @@ def simulate_side_by_side(runs: Sequence[Run[Any]]) -> list[Result]:
     kinds: dict[Hashable, list[int]] = {}
     for index, run in enumerate(runs):
         try:
-            machines[index] = run.system.ready(run)
+            machines[index] = _at_rest(run)
         except SimulationError as error:
             results[index] = error
         else:
@@ -49,6 +49,13 @@ def simulate_side_by_side(runs: Sequence[Run[Any]]) -> list[Result]:
         again = simulate_side_by_side([finer(runs[i]) for i in coarse])
         results.update(zip(coarse, again, strict=True))
     return [results[index] for index in range(len(runs))]
+
+
+def _at_rest(run: Run[Any]) -> Running:
+    """The machine of a run, which can be integrated and comes to rest; else SimulationError."""
+    running: Running = run.system.ready(run)
+    running.dynamics.check_rest()
+    return running
 
 
 def _kind(run: Run[Any], running: Running) -> Hashable:

@@ -13,13 +13,15 @@ from numpy.typing import NDArray
 
 from gensig.dynamics.equations import Equations, OverAngle
 from gensig.dynamics.mesh_teeth import MeshTeeth
-from gensig.dynamics.motion.at_rest import at_rest
+from gensig.dynamics.motion.at_rest import OUT_OF_BOUNDS, at_rest
 from gensig.dynamics.motion.course import Course, ShaftTorque
 from gensig.dynamics.motion.motion_checks import check_system, check_torques
+from gensig.errors import SimulationError
 
 Array = NDArray[np.float64]
 
 LONGEST_SETTLING = 0.45  # s
+MOST_NAMED = 3  # degrees of freedom in an error
 SETTLED = 1e-4  # share of the start's transient that is left
 STIFFER = 1.2  # than their mean stiffness are meshes taken for the longest step
 
@@ -106,6 +108,10 @@ class Dynamics:
         start, rotation = self.static_start(0.0), self.system.rotation
         return np.asarray(start - rotation * start[self.system.reference])
 
+    def check_rest(self) -> None:
+        """Raise SimulationError for torques and forces on what nothing holds."""
+        _ = self.rest
+
     def start(self, time: float) -> tuple[Array, Array]:
         """Deflections and their rates from which a motion settles at a nominal time, (dof,) each.
 
@@ -132,12 +138,24 @@ class Dynamics:
         """Deflection under the mean torques at a nominal time, without friction, (dof,).
 
         Under a nominal acceleration it is that of the accelerated machine.
+
+        Raises
+        ------
+        SimulationError    for torques and forces on what nothing holds
         """
         system, now = self.system, self.nominal.at(time)
         force = self._torques(self.torques, np.array([time]))[0]
         force -= system.mass * system.rotation * now.acceleration
         at_work = self.reference_force, self.mesh_stiffness
-        return at_rest(system, *at_work, now.angle, force)
+        still = at_rest(system, *at_work, now.angle, force)
+        loose = np.flatnonzero(~(np.abs(still) < OUT_OF_BOUNDS))
+        if len(loose):
+            names = ", ".join(self.dofs[dof] for dof in loose[:MOST_NAMED])
+            raise SimulationError(
+                f"the machine does not come to rest under its mean torques ({names}); check "
+                "torques, and springs and supports that hold it"
+            )
+        return still
 
     @property
     def sources(self) -> tuple[ShaftTorque, ...]:

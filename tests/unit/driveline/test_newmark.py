@@ -267,7 +267,7 @@ class TestRun:
         q = replace(held, torques=constant_torques([0.0, 5.0, 0.0])).static_start(0.0)
         assert q == pytest.approx([5e-3, 5.5e-3, 0.0], rel=1e-6, abs=1e-12)
         pushed = replace(held, torques=constant_torques([0.0, 0.0, 5.0]))
-        with refused(SimulationError, "does not come to rest under its mean torques"):
+        with refused(SimulationError, "its mean torques \\(disc_2\\)"):
             pushed.static_start(0.0)
 
     def test_rest_of_an_unloaded_line_is_where_it_is(self):
