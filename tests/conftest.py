@@ -108,11 +108,7 @@ def gear_with(xiamen) -> Callable[..., Gear]:
 @pytest.fixture(scope="session")
 def dynamics_of(running_of) -> Callable[..., Dynamics]:
     """A machine in motion, as ``running_of`` has it."""
-
-    def make(*given: Any, **errors: Any) -> Dynamics:
-        return running_of(*given, **errors).dynamics
-
-    return make
+    return lambda *given, **errors: running_of(*given, **errors).dynamics
 
 
 @pytest.fixture(scope="session")

@@ -58,10 +58,8 @@ def law_of(dynamics: Dynamics, step: float = 1e-6) -> Callable[..., np.ndarray]:
 
     The next call overwrites the result.
     """
-    group, scratch = (
-        pack([dynamics], step),
-        _classical_scheme.scratch(1, len(dynamics.dofs), "float64"),
-    )
+    group = pack([dynamics], step)
+    scratch = scratch_of(group)
     motion, result = np.empty((4, LANES)), np.empty((layout.N_LAW, LANES))
 
     def law(*state: float) -> np.ndarray:

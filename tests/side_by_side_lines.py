@@ -32,11 +32,10 @@ def as_line(pair):
         dofs=tuple(pair.dofs[dof] for dof in order),
         system=replace(
             system,
-            mass=system.mass[order],
-            damping=system.damping[both],
-            stiffness=system.stiffness[both],
-            rotation=system.rotation[order],
-            held=system.held[order],
+            **{
+                key: getattr(system, key)[order] for key in ("mass", "rotation", "held")
+            },
+            **{key: getattr(system, key)[both] for key in ("damping", "stiffness")},
             meshes=(replace(mesh, touched=places[mesh.touched]),),
             reference=pinion,
             angles=(pinion,),

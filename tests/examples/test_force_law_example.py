@@ -9,7 +9,6 @@ from force_law_example import Stop, StopLaw
 
 from gensig.dynamics.backends.nystroem.method import FORCE_LAWS
 from gensig.dynamics.decimation import in_band_error
-from gensig.dynamics.motion.course import ShaftTorque
 from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.dynamics.pair import PINION_Y, WHEEL_Y
 from gensig.errors import SimulationError
@@ -33,14 +32,10 @@ def with_spring(pair):
     along = np.zeros(len(pair.dofs))
     along[[PINION_Y, WHEEL_Y]] = 1.0, -1.0
     stiffness = pair.system.stiffness + STIFFNESS * np.outer(along, along)
-    push = [
-        ShaftTorque(dof=dof, table=np.array([-STIFFNESS * PRELOAD * along[dof]]))
-        for dof in (PINION_Y, WHEEL_Y)
-    ]
     return replace(
         pair,
         system=replace(pair.system, stiffness=stiffness),
-        torques=(*pair.torques, *push),
+        friction_torque=pair.friction_torque - STIFFNESS * PRELOAD * along,
     )
 
 

@@ -13,7 +13,7 @@ from refusals import refused
 
 from gensig.dynamics.mesh_state import mesh_signals
 from gensig.dynamics.pair import DOFS
-from gensig.errors import GeometryError
+from gensig.errors import GeometryError, SimulationError
 from gensig.faults.registry import read_faults
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
@@ -280,6 +280,16 @@ def test_kinds_are_simulated_together_in_the_order_given():
     runs = [Run(system=machines[number], faults=()) for number in (3, 0, 1, 0)]
     for run, record in zip(runs, simulate_together(runs), strict=True):
         assert_array_equal(record.acceleration, run.system.simulate().acceleration)
+
+
+def test_a_machine_that_nothing_holds_leaves_the_others_alone():
+    loose = read("spur_pair", "gear.pinion.support.stiffness_y_n_per_m=0")
+    with refused("mean torques (pinion_y, wheel_rotation); check", SimulationError):
+        loose.check()
+    runs = [Run(system=each, faults=()) for each in (loose, read("spur_pair"))]
+    error, sound = simulate_together(runs)
+    assert isinstance(error, SimulationError)
+    assert_array_equal(sound.acceleration, read_record().acceleration)
 
 
 def test_set_points_teeth_and_discs(any_machine):
