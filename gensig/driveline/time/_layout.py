@@ -105,10 +105,11 @@ class Meshes(NamedTuple):
     """All meshes: ``number`` (mesh, N_NUMBERS), ``integers`` (mesh, N_INTEGERS), and flat
     arrays for all of them.
 
-    ``table`` holds, node after node of row after row, the gap in m and the stiffness of every
-    spring in N/m, each with its slope per cell; ``depth`` where its springs begin beyond the gap,
-    m; ``rows`` the row of every pair of kinds, -1 for a pair that never touches; ``kind``,
-    ``error`` and ``tilt`` one number a tooth, the last two where ``AT_ERROR_`` says.
+    ``table`` holds, node after node of row after row, the gap in m and the compliance of every
+    chord in m/N without what pairs share, each with its slope per cell; ``depth`` where chords
+    begin beyond the gap, m; ``rows`` the row of every pair of kinds, -1 for a pair that never
+    touches; ``kind``, ``error`` and ``tilt`` one number a tooth, the last two where ``AT_ERROR_``
+    says.
     """
 
     number: Any

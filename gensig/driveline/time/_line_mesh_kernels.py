@@ -30,12 +30,13 @@ def between(table, low, high, share, per_cell, out):
     """Value and slope, ``share`` of the way between two nodes whose values and slopes stand at
     ``low`` and ``high``.
 
-    Of the cubic through both. ``per_cell`` is the slope asked for over that per cell.
+    Slopes are linear, and values are their integral. ``per_cell`` is the slope asked for over
+    that per cell.
     """
-    rise, slope, slope_1 = table[high] - table[low], table[low + 1], table[high + 1]
-    bend, twist = 3.0 * rise - 2.0 * slope - slope_1, slope + slope_1 - 2.0 * rise
-    out[0] = table[low] + share * (slope + share * (bend + share * twist))
-    out[1] = per_cell * (slope + share * (2.0 * bend + 3.0 * share * twist))
+    rise, slope = table[high] - table[low], table[low + 1]
+    bend = table[high + 1] - slope
+    out[0] = table[low] + share * (rise - 0.5 * (1.0 - share) * bend)
+    out[1] = per_cell * (slope + share * bend)
 
 
 @compiled
@@ -93,10 +94,12 @@ def gather(meshes, mesh, flank, turned, within, pairs):
             error = meshes.error[at_a] + meshes.error[at_b]
             here[layout.GAP] += error + tilt * beyond
             here[layout.GAP_SLOPE] += tilt
-        for spring in range(n_springs):
-            if here[layout.GAP] + meshes.depth[at_depth + spring] > reach:
-                break
-            column = spring_column(spring)
+        touching = 0
+        while (
+            touching < n_springs
+            and here[layout.GAP] + meshes.depth[at_depth + touching] <= reach
+        ):
+            column = spring_column(touching)
             between(
                 meshes.table,
                 low + column,
@@ -105,7 +108,26 @@ def gather(meshes, mesh, flank, turned, within, pairs):
                 sense * n_nodes,
                 here[column:],
             )
+            touching += 1
+        set_springs(here, touching)
     return reach
+
+
+@compiled
+def set_springs(pair, n_chords):
+    """Turn the compliances of a pair's chords, with their slopes, into stiffnesses of its springs.
+
+    A spring is as stiff as its chord is above the stiffest before.
+    """
+    stiffest, growing = 0.0, 0.0
+    for chord in range(n_chords):
+        column = spring_column(chord)
+        stiff = 1.0 / pair[column]
+        growth = -stiff * stiff * pair[column + 1]
+        if not stiff > stiffest:
+            stiff, growth = stiffest, growing
+        pair[column], pair[column + 1] = stiff - stiffest, growth - growing
+        stiffest, growing = stiff, growth
 
 
 @compiled

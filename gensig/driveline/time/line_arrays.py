@@ -22,7 +22,6 @@ from gensig.dynamics.equations import A_TURN, B_TURN, Equations, Mesh
 from gensig.dynamics.helical import pitches
 from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import SimulationError
-from gensig.mesh.pair_table import SMOOTHED_GAP, SMOOTHED_SHARE
 from gensig.mesh.tooth_table import ToothTable
 
 Array = NDArray[np.float64]
@@ -152,7 +151,8 @@ def _numbers(mesh: Mesh, turning: float) -> tuple[float, ...]:
     teeth, pair, table = mesh.teeth, mesh.teeth.pair, mesh.teeth.table
     pitches_per_rad = pair.pinion.n_teeth / (2.0 * np.pi)
     upright = (pair.pitch_point + table.half_lag) / pair.base_pitch
-    smoothed = 0.25 * SMOOTHED_GAP
+    bends = _cell(table) * np.diff(table.pairs.gap_slope[:, :, 0], axis=-1)
+    below = 0.125 * float(bends.max(initial=0.0))  # the nodes, a gap between them
     return (
         pair.backlash,
         mesh.damping,
@@ -162,8 +162,8 @@ def _numbers(mesh: Mesh, turning: float) -> tuple[float, ...]:
         float(np.sign(turning)) * pitches_per_rad,
         2.0 * upright + 0.5,
         upright,
-        float(teeth.nearest_gaps.min()) - smoothed,
-        float(table.pairs.gap[:, :, 0].min()) - smoothed,
+        float(teeth.nearest_gaps.min()) - below,
+        float(table.pairs.gap[:, :, 0].min()) - below,
     )
 
 
@@ -183,47 +183,26 @@ def _friction(table: ToothTable) -> tuple[float, ...]:
 
 
 def _columns(table: ToothTable) -> Array:
-    """First gap and stiffness of every spring, each with its slope per cell.
+    """First gap and what every chord's own pair yields, each with its slope per cell.
 
     (pair of kinds, node, column). The force of a pair is made of chords between fixed depths of
     bite D_l and is convex, so that springs side by side that begin to bear at D_l, each as stiff
     as its chord is above the one before, are the same force. Force, energy and the torque of the
     passing teeth then come from one potential, whatever the depth.
     """
-    n_springs, n_nodes = len(table.depth), len(table.position)
-    pairs = table.pairs
-    chords = 1.0 / (pairs.compliance - table.shared_compliance)
-    stiffest = np.maximum.accumulate(chords, axis=2)
-    stiffness = np.diff(stiffest, axis=2, prepend=0.0).reshape(-1, n_nodes)
-    touch = pairs.gap[:, :, 0].reshape(-1, n_nodes)
-    gap = np.stack([touch, _slopes(touch, SMOOTHED_GAP)], axis=2)
-    slope = _slopes(stiffness, SMOOTHED_SHARE * float(stiffness.max()))
-    springs = np.stack([stiffness, slope], axis=2).reshape(-1, n_springs, n_nodes, 2)
-    of_springs = np.moveaxis(springs, 1, 2).reshape(len(touch), n_nodes, -1)
-    return np.concatenate([gap, of_springs], axis=2)
+    pairs, distance = table.pairs, _cell(table)
+    own = pairs.compliance - table.shared_compliance
+    chords = np.stack([own, distance * pairs.compliance_slope], axis=-1)
+    gap = np.stack([pairs.gap, distance * pairs.gap_slope], axis=-1)
+    columns = np.concatenate([gap[:, :, :1], chords], axis=2)
+    by_node = np.moveaxis(columns, 2, 3)
+    n_nodes = len(table.position)
+    return by_node.reshape(-1, n_nodes, columns.shape[2] * columns.shape[4])
 
 
-def _slopes(values: Array, limit: float) -> Array:
-    """Slopes per cell at the nodes, (row, node): central differences, with which cubics between
-    the nodes are smooth.
-
-    Where the second difference exceeds ``limit``, or what is 0 begins to grow, the harmonic mean
-    of both chords (0 at a turn) stands instead: its cubics never leave the values at their ends,
-    so that an edge stays one. At the ends the chord itself. Source: Fritsch & Butland, SIAM J.
-    Sci. Stat. Comput. 5 (1984).
-    """
-    chord = np.diff(values, axis=1)
-    before, after = chord[:, :-1], chord[:, 1:]
-    mean, product = 0.5 * (before + after), before * after
-    limited = np.divide(product, mean, out=np.zeros_like(mean), where=product > 0.0)
-    is_smooth = (
-        (np.abs(after - before) <= limit)
-        & (values[:, :-2] != 0.0)
-        & (values[:, 2:] != 0.0)
-    )
-    return np.concatenate(
-        [chord[:, :1], np.where(is_smooth, mean, limited), chord[:, -1:]], axis=1
-    )
+def _cell(table: ToothTable) -> float:
+    """Distance of the nodes of a table, m."""
+    return float(table.position[1] - table.position[0])
 
 
 def pack_course(line: Dynamics) -> Knots:
