@@ -21,14 +21,15 @@ N_NUMBERS = AT_FRICTION + N_FRICTION
 # whole numbers of a mesh; those called AT_ say where a flat array begins
 (
     ROLL_DOF, N_PAIRS, FIRST, NODES, AT_TABLE, AT_ROWS, AT_COAST_ROWS, TEETH_A, TEETH_B,
-    AT_KIND_A, AT_KIND_B, AT_ERROR_A, AT_ERROR_B, START_A, START_B, N_KINDS_B, N_SPRINGS,
+    AT_KIND_A, AT_KIND_B, AT_ERROR_A, AT_ERROR_B, START_A, START_B, N_KINDS_B, N_CHORDS,
     AT_DEPTH, N_INTEGERS,
 ) = range(19)  # fmt: skip
-# what is gathered of a pair: gap and stiffness of each of its springs, each with how fast it
-# grows as the mesh rolls on
-GAP, GAP_SLOPE, STIFFNESS = range(3)
-PER_SPRING = 2
-# behind the springs: where the pair stands, pitches from A, and its normal force
+# what is gathered of every chord of a pair, each with how fast it grows as the mesh rolls on; the
+# gap of the first chord is that of the first touch
+GAP, GAP_SLOPE, COMPLIANCE, COMPLIANCE_SLOPE, LEFT_OUT, LEFT_OUT_SLOPE, PER_CHORD = (
+    range(7)
+)
+# behind the chords: where the pair stands, pitches from A, and its normal force
 PLACE, PRESSED, N_BEHIND = -2, -1, 2
 DRIVE, COAST, N_FLANKS = range(3)
 # what a mesh does at an instant; LOST is a power, ALONG the force on the roll coordinate, J per
@@ -44,23 +45,13 @@ INPUT, PASSING, DISSIPATED, THROUGHPUT, ROUNDS, N_SUMS = range(6)
 
 
 @inlined
-def spring_column(spring):
-    """Column of the stiffness of a spring in what is gathered of a pair.
-
-    Its slope stands behind it.
-    """
-    return STIFFNESS + PER_SPRING * spring
-
-
-@inlined
 def node_offset(integers, row, n_cells, cell):
     """Offset in ``Meshes.table`` of the node before a cell of a row.
 
     ``integers`` are the whole numbers of the mesh.
     """
-    return integers[AT_TABLE] + (row * (n_cells + 1) + cell) * spring_column(
-        integers[N_SPRINGS]
-    )
+    n_columns = PER_CHORD * integers[N_CHORDS]
+    return integers[AT_TABLE] + (row * (n_cells + 1) + cell) * n_columns
 
 
 class Rows(NamedTuple):
@@ -105,11 +96,11 @@ class Meshes(NamedTuple):
     """All meshes: ``number`` (mesh, N_NUMBERS), ``integers`` (mesh, N_INTEGERS), and flat
     arrays for all of them.
 
-    ``table`` holds, node after node of row after row, the gap in m and the compliance of every
-    chord in m/N without what pairs share, each with its slope per cell; ``depth`` where chords
-    begin beyond the gap, m; ``rows`` the row of every pair of kinds, -1 for a pair that never
-    touches; ``kind``, ``error`` and ``tilt`` one number a tooth, the last two where ``AT_ERROR_``
-    says.
+    ``table`` holds, node after node of row after row and chord after chord, the gap in m, the
+    compliance in m/N without what pairs share and the energy left out in J, each with its slope
+    per cell; ``depth`` where chords begin beyond the first gap, m; ``rows`` the row of every pair
+    of kinds, -1 for a pair that never touches; ``kind``, ``error`` and ``tilt`` one number a
+    tooth, the last two where ``AT_ERROR_`` says.
     """
 
     number: Any

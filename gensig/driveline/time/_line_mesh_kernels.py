@@ -12,8 +12,9 @@ import math
 import numpy as np
 
 from gensig.driveline.time import _layout as layout
-from gensig.driveline.time._layout import COAST, DRIVE, node_offset, spring_column
+from gensig.driveline.time._layout import COAST, DRIVE, node_offset
 from gensig.dynamics._layout import SEEN_FORCE, SEEN_NEWEST, SEEN_PAIRS
+from gensig.dynamics._tables import NEAR_CHORD
 from gensig.dynamics._vector import compiled
 
 MOST_ROUNDS = 60
@@ -41,13 +42,12 @@ def between(table, low, high, share, per_cell, out):
 
 @compiled
 def gather(meshes, mesh, flank, turned, within, pairs):
-    """Gap and stiffnesses of the pairs of a flank and their slopes, where the mesh has rolled
-    ``turned`` pitches.
+    """Gap, compliance and energy left out of the chords of a flank's pairs and their slopes, where
+    the mesh has rolled ``turned`` pitches.
 
     ``pairs`` (mesh, flank, pair, what is gathered) takes them; pairs that do not exist stand
     infinitely far back. The back flanks meet along the mirrored roll, so their teeth count
-    backwards. Of several springs those are left out that begin beyond ``within`` m and a depth
-    more.
+    backwards. Chords are left out that begin beyond ``within`` m and a depth more.
 
     Returns
     -------
@@ -65,9 +65,9 @@ def gather(meshes, mesh, flank, turned, within, pairs):
         turned = meshes.number[mesh, layout.MIRROR] - turned
     newest = math.floor(turned) - first
     n_cells = n_pairs * n_nodes
-    n_springs, at_depth = integers[layout.N_SPRINGS], integers[layout.AT_DEPTH]
-    n_columns, reach = spring_column(n_springs), np.inf
-    if n_springs > 1:
+    n_chords, at_depth = integers[layout.N_CHORDS], integers[layout.AT_DEPTH]
+    n_columns, reach = layout.PER_CHORD * n_chords, np.inf
+    if n_chords > 1:
         reach = within + meshes.depth[at_depth + 1]
     for j in range(n_pairs):
         index = newest - j
@@ -81,110 +81,118 @@ def gather(meshes, mesh, flank, turned, within, pairs):
             here[layout.GAP] = np.inf
             continue
         here[layout.PLACE] = turned - index
-        x = (turned - (index + first)) * n_nodes
-        cell = min(max(int(x), 0), n_cells - 1)
-        low = node_offset(integers, row, n_cells, cell)
-        high = low + n_columns
-        between(meshes.table, low, high, x - cell, sense * n_nodes, here[layout.GAP :])
+        open_by, tilt = 0.0, 0.0
         if flank == DRIVE:
             at_a = integers[layout.AT_ERROR_A] + tooth_a
             at_b = integers[layout.AT_ERROR_B] + tooth_b
             tilt = meshes.tilt[at_a] + meshes.tilt[at_b]
             beyond = turned - index - meshes.number[mesh, layout.UPRIGHT]
-            error = meshes.error[at_a] + meshes.error[at_b]
-            here[layout.GAP] += error + tilt * beyond
-            here[layout.GAP_SLOPE] += tilt
-        touching = 0
-        while (
-            touching < n_springs
-            and here[layout.GAP] + meshes.depth[at_depth + touching] <= reach
-        ):
-            column = spring_column(touching)
-            between(
-                meshes.table,
-                low + column,
-                high + column,
-                x - cell,
-                sense * n_nodes,
-                here[column:],
-            )
-            touching += 1
-        set_springs(here, touching)
-    return reach
+            open_by = meshes.error[at_a] + meshes.error[at_b] + tilt * beyond
+        x = (turned - (index + first)) * n_nodes
+        cell = min(max(int(x), 0), n_cells - 1)
+        low = node_offset(integers, row, n_cells, cell)
+        for chord in range(n_chords):
+            if chord > 0 and here[layout.GAP] + meshes.depth[at_depth + chord] > reach:
+                break
+            start = chord * layout.PER_CHORD
+            for part in range(start, start + layout.PER_CHORD, 2):
+                at_low, at_high = low + part, low + n_columns + part
+                per_cell = sense * n_nodes
+                between(meshes.table, at_low, at_high, x - cell, per_cell, here[part:])
+            here[start + layout.GAP] += open_by
+            here[start + layout.GAP_SLOPE] += tilt
+    return reach - NEAR_CHORD
 
 
 @compiled
-def set_springs(pair, n_chords):
-    """Turn the compliances of a pair's chords, with their slopes, into stiffnesses of its springs.
+def bearing_chord(pair, depth, local):
+    """First column of the chord that bears most where the body stands at ``local`` m, and its
+    force, negative where the pair does not touch.
 
-    A spring is as stiff as its chord is above the stiffest before.
+    Chords begin at ``depth`` (chord,) m beyond the gap.
     """
-    stiffest, growing = 0.0, 0.0
-    for chord in range(n_chords):
-        column = spring_column(chord)
-        stiff = 1.0 / pair[column]
-        growth = -stiff * stiff * pair[column + 1]
-        if not stiff > stiffest:
-            stiff, growth = stiffest, growing
-        pair[column], pair[column + 1] = stiff - stiffest, growth - growing
-        stiffest, growing = stiff, growth
+    start, touch = 0, local - pair[layout.GAP]
+    if not touch > 0.0:
+        return start, touch
+    most = touch / pair[layout.COMPLIANCE]
+    for chord in range(1, len(depth)):
+        if touch < depth[chord] - NEAR_CHORD:
+            break
+        column = chord * layout.PER_CHORD
+        bite = local - pair[column + layout.GAP]
+        force = bite / pair[column + layout.COMPLIANCE]
+        if force > most:
+            start, most = column, force
+    return start, most
+
+
+@compiled
+def shared_load(pairs, depth, shared, within):
+    """Load of all pairs of a flank that deflect a ``shared`` body, and the sum of their
+    stiffnesses.
+
+    Newton's method from no load. A pair's force is convex in its approach, so that every round
+    raises the load, and the last one is exact.
+    """
+    total, stiffness = 0.0, 0.0
+    for _ in range(len(pairs) * len(depth) + 1):
+        stiffness, force = 0.0, 0.0
+        for j in range(len(pairs)):
+            start, elastic = bearing_chord(pairs[j], depth, within - shared * total)
+            if elastic > 0.0:
+                stiff = 1.0 / pairs[j, start + layout.COMPLIANCE]
+                stiffness += stiff
+                force += stiff * (within - pairs[j, start + layout.GAP])
+        grown = force / (1.0 + shared * stiffness)
+        if not grown > total:
+            break
+        total = grown
+        if shared == 0.0:
+            break
+    return total, stiffness
 
 
 @compiled
 def flank_law(pairs, depth, damping, shared, within, rate, roll_rate):
     """Law of the gathered pairs of a flank, ``within`` m beyond where healthy teeth touch; their
-    springs begin at ``depth`` (spring,) m beyond the gap.
+    chords begin at ``depth`` (chord,) m beyond the gap.
 
-    Sets the normal force of every pair, where there is any force.
+    Sets the normal force of every pair, where there is any force. Damping follows the gap of the
+    first touch.
 
     Returns
     -------
     what ``_layout.N_LAW`` names: force, its slopes over approach and rate, stored energy, power
     lost, force along the roll
     """
-    total, least = 0.0, 0.0
-    for _ in range(len(pairs) * len(depth) + 1):
-        stiffness, force = 0.0, 0.0
-        for j in range(len(pairs)):
-            for spring in range(len(depth)):
-                bite = within - pairs[j, layout.GAP] - depth[spring]
-                if not bite > least:
-                    break
-                stiff = pairs[j, spring_column(spring)]
-                stiffness += stiff
-                force += stiff * bite
-        total = force / (1.0 + shared * stiffness)
-        # each pair that the shared deflection lifts off raises the total, and may so lift another
-        if shared * total <= least:
-            break
-        least = shared * total
+    total, stiffness = shared_load(pairs, depth, shared, within)
     if not total > 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     softer = 1.0 / (1.0 + shared * stiffness)
     normal, tangent, rate_tangent, lost, along = 0.0, 0.0, 0.0, 0.0, 0.0
     stored = 0.5 * shared * total * total
     for j in range(len(pairs)):
-        on_pair = 0.0
-        for spring in range(len(depth)):
-            bite = within - pairs[j, layout.GAP] - depth[spring] - shared * total
-            if not bite > 0.0:
-                break
-            column = spring_column(spring)
-            stiff, slope = pairs[j, column], pairs[j, layout.GAP_SLOPE]
-            elastic = stiff * bite
+        pair = pairs[j]
+        start, elastic = bearing_chord(pair, depth, within - shared * total)
+        pressed = 0.0
+        if elastic > 0.0:
+            chord = pair[start:]
+            slope = pair[layout.GAP_SLOPE]
             speed = rate - slope * roll_rate
             grown = 1.0 + damping * speed
-            pressed = 0.0
             if grown > 0.0:
                 pressed = elastic * grown
-                tangent += stiff * softer * grown
+                tangent += softer * grown / chord[layout.COMPLIANCE]
                 rate_tangent += elastic * damping
-            on_pair += pressed
-            stored += 0.5 * elastic * bite
+            square = 0.5 * elastic * elastic
+            stored += chord[layout.COMPLIANCE] * square + chord[layout.LEFT_OUT]
             lost += (pressed - elastic) * speed
-            along += pressed * slope - 0.5 * bite * bite * pairs[j, column + 1]
-        normal += on_pair
-        pairs[j, layout.PRESSED] = on_pair
+            along += elastic * chord[layout.GAP_SLOPE] + (pressed - elastic) * slope
+            along += (
+                square * chord[layout.COMPLIANCE_SLOPE] - chord[layout.LEFT_OUT_SLOPE]
+            )
+        normal += pressed
+        pair[layout.PRESSED] = pressed
     return normal, tangent, rate_tangent, stored, lost, along
 
 
@@ -242,7 +250,7 @@ def mesh_law(meshes, mesh, turned, roll_rate, approach, rate, law, work):
     """
     number, integers, total = meshes.number[mesh], meshes.integers[mesh], law[mesh]
     n_pairs, at_depth = integers[layout.N_PAIRS], integers[layout.AT_DEPTH]
-    depth = meshes.depth[at_depth : at_depth + integers[layout.N_SPRINGS]]
+    depth = meshes.depth[at_depth : at_depth + integers[layout.N_CHORDS]]
     total[:] = 0.0
     for flank in range(layout.N_FLANKS):
         within, least, sense = approach, number[layout.LEAST_GAP], 1.0

@@ -22,7 +22,7 @@ from gensig.dynamics.equations import A_TURN, B_TURN, Equations, Mesh
 from gensig.dynamics.helical import pitches
 from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import SimulationError
-from gensig.mesh.tooth_table import ToothTable
+from gensig.mesh.tooth_table import ToothTable, left_out_energy
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -183,21 +183,23 @@ def _friction(table: ToothTable) -> tuple[float, ...]:
 
 
 def _columns(table: ToothTable) -> Array:
-    """First gap and what every chord's own pair yields, each with its slope per cell.
+    """Gap, own compliance and energy left out of every chord, each with its slope per cell.
 
-    (pair of kinds, node, column). The force of a pair is made of chords between fixed depths of
-    bite D_l and is convex, so that springs side by side that begin to bear at D_l, each as stiff
-    as its chord is above the one before, are the same force. Force, energy and the torque of the
-    passing teeth then come from one potential, whatever the depth.
+    (pair of kinds, node, column). The force of a pair is the largest of its chords.
     """
     pairs, distance = table.pairs, _cell(table)
-    own = pairs.compliance - table.shared_compliance
-    chords = np.stack([own, distance * pairs.compliance_slope], axis=-1)
-    gap = np.stack([pairs.gap, distance * pairs.gap_slope], axis=-1)
-    columns = np.concatenate([gap[:, :, :1], chords], axis=2)
-    by_node = np.moveaxis(columns, 2, 3)
-    n_nodes = len(table.position)
-    return by_node.reshape(-1, n_nodes, columns.shape[2] * columns.shape[4])
+    left_out, left_out_slope = left_out_energy(table)
+    columns = [
+        pairs.gap,
+        distance * pairs.gap_slope,
+        pairs.compliance - table.shared_compliance,
+        distance * pairs.compliance_slope,
+        left_out,
+        distance * left_out_slope,
+    ]
+    by_node = np.moveaxis(np.stack(columns, axis=-1), 2, 3)
+    n_nodes, n_chords = by_node.shape[2:4]
+    return by_node.reshape(-1, n_nodes, n_chords * layout.PER_CHORD)
 
 
 def _cell(table: ToothTable) -> float:

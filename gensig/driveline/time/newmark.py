@@ -320,8 +320,8 @@ def _scratch(system: Equations) -> Work:
     n, m = len(system.mass), len(system.meshes)
     tables = [mesh.teeth.table for mesh in system.meshes]
     most = max([1, *[table.n_pairs for table in tables]])
-    most_springs = max([1, *[len(table.depth) for table in tables]])
-    n_columns = layout.STIFFNESS + layout.PER_SPRING * most_springs + layout.N_BEHIND
+    most_chords = max([1, *[len(table.depth) for table in tables]])
+    n_columns = layout.PER_CHORD * most_chords + layout.N_BEHIND
     return Work._make(
         [
             *np.zeros((4, n)),

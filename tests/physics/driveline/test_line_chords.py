@@ -1,5 +1,5 @@
-"""Sliced teeth in a line's mesh: springs side by side are the chords, from one potential; the pair
-dynamics' motion.
+"""Sliced teeth in a line's mesh: the largest chord bears, from one potential; the pair dynamics'
+motion.
 """
 
 import math
@@ -60,9 +60,6 @@ def mesh(helical):
 class TestLaw:
     @pytest.mark.parametrize("share", [0.02, 0.3, 1.0, 2.5])
     def test_statics_agree_whatever_the_load(self, helical, mesh, share):
-        """Chords that are interpolated on their own meet at their depths but for the smoothing of
-        their kinks.
-        """
         table, force = helical
         rolls = np.linspace(0.05, 30.05, 61)
         meeting = Meeting(errors=mesh.teeth.errors)
@@ -76,7 +73,7 @@ class TestLaw:
             for turned, approach in zip(rolls, computed.approach, strict=True)
         ]
 
-        assert_close(forces, share * force, 1e-3)
+        assert_close(forces, share * force, 1e-4)
 
     @pytest.mark.parametrize("approach", [2e-5, 6e-5, -1.5e-4])
     @pytest.mark.parametrize("turned", [0.313, 2.711, 9.173])
@@ -96,7 +93,7 @@ class TestLaw:
         assert_close(law[layout.ALONG], -further / 2e-7, 1e-3, atol=1e-6)
         assert_close(law[layout.FORCE], deeper / 2e-10, 1e-4)
 
-    def test_all_springs_of_a_pair_are_damped_by_its_first_touch(self, mesh):
+    def test_all_chords_of_a_pair_are_damped_by_its_first_touch(self, mesh):
         still = law_at(mesh, 0.4, 3e-5)
         fast = law_at(mesh, 0.4, 3e-5, rate=10.0)
         assert_close(
@@ -210,6 +207,6 @@ class TestAgainstThePair:
         assert_close(
             v_1,
             v,
-            atol=2e-3 * np.abs(v).max(),
+            atol=1e-3 * np.abs(v).max(),
         )
         assert_close(q_1 @ direction, q @ direction, atol=5e-8)

@@ -114,16 +114,15 @@ RAMP = ("operating=ramp",)
         ("spur", 6, (), 3e-3),
         ("spur", None, (RIPPLE,), 3e-3),
         ("spur", None, (RIPPLE, *RAMP), 3e-3),
-        ("helical", None, (), 0.01),
-        ("helical", 6, (), 0.01),
+        ("helical", None, (), 3e-3),
+        ("helical", 6, (), 3e-3),
     ],
 )
 def test_two_stages_agree_with_the_implicit_method(kind, grade, more, limit):
     """Both methods have one law of the teeth, friction, tilts and torques over an angle included.
 
     They differ in the dampers of the shafts, which have none here, and in where their records
-    begin, which a quick governor forgets. Between the nodes of helical tables they differ by up to
-    1 % of a quiet record, and by a fourth of that with four times the nodes.
+    begin, which a quick governor forgets.
     """
     channels = "sensing.channels=[pinion_x, pinion_y, wheel_y]"
     words = [*BOXES[kind], *NO_LOSS, *more, channels]
