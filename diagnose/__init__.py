@@ -1,5 +1,1 @@
 """Small, honest fault classification on gensig data sets."""
-
-from gensig import moved
-
-moved.install()

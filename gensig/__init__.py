@@ -17,7 +17,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gensig import moved
 from gensig.version import __version__
 
 if TYPE_CHECKING:
@@ -38,8 +37,6 @@ __all__ = [
     "open_dataset",
     "stream",
 ]
-
-moved.install()
 
 
 def open_dataset(

@@ -12,8 +12,6 @@ from pathlib import Path
 import grimp
 import pytest
 
-from gensig.moved import MOVED
-
 ROOT = Path(__file__).resolve().parent.parent
 MOST_MODULES = 20  # of a folder
 MOST_LINES = 500  # of a file
@@ -373,38 +371,6 @@ def test_module_names_are_unique(package: str) -> None:
     ]
     names = Counter(path.stem for path in files)
     assert {name for name, n in names.items() if n > 1} <= SHARED_NAMES
-
-
-NAMED_IN_THE_DOCS = (
-    "from gensig.config import read_request",
-    "from gensig.streaming import RecordStream",
-    "from gensig.pairs import FaultPairs",
-    "from gensig.systems.pair_machine import PairMachine, Run, Start, simulate_together",
-    "from gensig.systems.shaft_line import DriveLine, read_drive_line",
-    "from diagnose.data import StreamingDataset, VibrationDataset",
-    "from diagnose.metrics import over_records, score_with_interval",
-    "from diagnose.models import SmallCnn, build_model, check_window",
-    "from diagnose.train import with_shuffled_labels",
-    "import diagnose.model_io; diagnose.model_io.load_model",
-)
-
-
-def test_imports_of_0_9_keep_working() -> None:
-    """In a process of its own: a module that is loaded already would be found."""
-    result = run(
-        sys.executable,
-        "-c",
-        "; ".join((*NAMED_IN_THE_DOCS, *(f"import {name}" for name in MOVED))),
-    )
-    assert result.returncode == 0, result.stderr
-
-
-def test_a_moved_module_is_the_same_object() -> None:
-    code = (
-        "import diagnose.metrics, diagnose.scoring.metrics as new; "
-        "assert diagnose.metrics is new"
-    )
-    assert run(sys.executable, "-c", code).returncode == 0
 
 
 # the doors: what reaches a terminal is escaped, and no cell of a table is a formula

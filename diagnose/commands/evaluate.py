@@ -14,7 +14,7 @@ from diagnose.commands.parser import (
     refuse_existing,
 )
 from gensig.errors import ConfigError
-from gensig.terminal.printing import remark, show
+from gensig.terminal.printing import show
 
 HELP = """\
 Evaluate a trained network on a data set.
@@ -35,7 +35,6 @@ examples:
   diagnose evaluate --model report/models/new_machine-seed0 data=runs/other
   diagnose evaluate --model report/models/new_machine-seed0 data=runs/other channels=wheel_x"""
 KEYS = ("data", "out", "protocol", "subset", "channels")
-FORMER = "model_dir"  # spelling of --model until version 0.13
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -47,7 +46,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Judge a trained network and print its scores."""
     values = _key_values(arguments.overrides)
-    model = _model(arguments.model, values.pop(FORMER, None))
     out = values.get("out")
     if out is not None:
         refuse_existing(Path(out))
@@ -58,7 +56,7 @@ def run(arguments: Namespace) -> int:
     channels = None
     if "channels" in values:
         channels = values["channels"].strip("[]").split(",")
-    folder = model or shipped_network()
+    folder = arguments.model or shipped_network()
     network = open_network(folder)
     note_unsigned(folder, network.description)
     evaluation = evaluate_network(
@@ -75,17 +73,6 @@ def run(arguments: Namespace) -> int:
     return 0
 
 
-def _model(given: str | None, former: str | None) -> str | None:
-    """Folder of the network, which may be given by the former key too; None for the shipped one."""
-    if former is None:
-        return given
-    if given is not None:
-        raise ConfigError(f"--model and {FORMER} are both given; leave {FORMER} out")
-    text = f"{FORMER}=DIR is the former spelling of --model DIR"
-    remark("diagnose", f"note: {text}")
-    return former
-
-
 def _key_values(words: Sequence[str]) -> dict[str, str]:
     """Words of the form key=value as a dictionary.
 
@@ -96,7 +83,7 @@ def _key_values(words: Sequence[str]) -> dict[str, str]:
         key, equals, value = word.partition("=")
         if not equals or not value:
             raise ConfigError(f"'{word}' is not of the form key=value")
-        if key not in (*KEYS, FORMER):
+        if key not in KEYS:
             hint = f"there is {', '.join(KEYS)}"
             if key.startswith("model"):
                 hint = "a model is given as --model DIR"

@@ -54,13 +54,11 @@ from gensig.systems.supports import in_gearbox
 
 Array = NDArray[np.float64]
 
-PairMachine = Machine  # the name of version 0.9
 
 __all__ = [
     "CleanRecord",
     "GearPairMachine",
     "Machine",
-    "PairMachine",
     "Run",
     "Start",
     "running_pair",

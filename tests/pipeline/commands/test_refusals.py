@@ -77,7 +77,6 @@ REFUSED = {
     "diagnose train --out x": "no flag '--out'; type out=DIR",
     "diagnose evaluate data=x modl=y": "there is data, out",
     "diagnose evaluate data=x model=y": "--model DIR",
-    "diagnose evaluate data=x model_dir=y --model z": "leave model_dir out",
     # files
     "gensig verify nothing": "nothing does not exist",
     "gensig resume nothing": "nothing does not exist",

@@ -254,16 +254,6 @@ def test_evaluate_refuses_folders_that_are_no_model(trained, data, capsys, tmp_p
     refuses(capsys, [*words, "--model", str(tmp_path / "x")], "does not exist")
 
 
-def test_the_former_spelling_of_the_model_works_with_a_note(trained, data, capsys):
-    model = str(model_of(trained))
-    shown = says(capsys, "evaluate", "data=good", "--model", model)
-    assert main(["evaluate", "data=good", f"model_dir={model}"]) == 0
-    printed = capsys.readouterr()
-    assert printed.out == shown
-    note = "diagnose: note: model_dir=DIR is the former spelling of --model DIR\n"
-    assert note in printed.err
-
-
 TRAIN = "train data=good out=OUT"
 
 
@@ -279,7 +269,7 @@ TRAIN = "train data=good out=OUT"
         (f"{TRAIN} normalise=rms,none", "-m"),
         (f"{TRAIN} model=cnn window_samples=100000", "longest stretch"),
         ("train --fast", "no flag '--fast'"),
-        ("evaluate model_dir=good", "data is required"),
+        ("evaluate out=good", "data is required"),
         ("evaluate data=good modeldir=x", "--model"),
         ("evaluate data=good x", "not of the form key=value"),
         ("learn", "no command 'learn'"),
@@ -365,7 +355,7 @@ def test_without_its_packages_it_says_what_to_install(missing, tmp_path):
     for words in (
         ("train", "data=nothere", "out=report"),
         ("predict", "nothere.csv", "--speed-rpm", "1800"),
-        ("evaluate", "model_dir=nothere"),
+        ("evaluate", "data=nothere"),
     ):
         done = run(*words)
         assert done.returncode == 2
