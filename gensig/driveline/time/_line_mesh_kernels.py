@@ -14,7 +14,6 @@ import numpy as np
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time._layout import COAST, DRIVE, node_offset
 from gensig.dynamics._layout import SEEN_FORCE, SEEN_NEWEST, SEEN_PAIRS
-from gensig.dynamics._tables import NEAR_CHORD
 from gensig.dynamics._vector import compiled
 
 MOST_ROUNDS = 60
@@ -47,7 +46,7 @@ def gather(meshes, mesh, flank, turned, within, pairs):
 
     ``pairs`` (mesh, flank, pair, what is gathered) takes them; pairs that do not exist stand
     infinitely far back. The back flanks meet along the mirrored roll, so their teeth count
-    backwards. Chords are left out that begin beyond ``within`` m and a depth more.
+    backwards. Chords are left out that begin beyond ``within`` m and two depths more.
 
     Returns
     -------
@@ -66,9 +65,10 @@ def gather(meshes, mesh, flank, turned, within, pairs):
     newest = math.floor(turned) - first
     n_cells = n_pairs * n_nodes
     n_chords, at_depth = integers[layout.N_CHORDS], integers[layout.AT_DEPTH]
-    n_columns, reach = layout.PER_CHORD * n_chords, np.inf
+    n_columns, reach, last = layout.PER_CHORD * n_chords, np.inf, np.inf
     if n_chords > 1:
         reach = within + meshes.depth[at_depth + 1]
+        last = reach + meshes.depth[at_depth + 1]
     for j in range(n_pairs):
         index = newest - j
         tooth_a = (integers[layout.START_A] + sense * index) % integers[layout.TEETH_A]
@@ -92,7 +92,7 @@ def gather(meshes, mesh, flank, turned, within, pairs):
         cell = min(max(int(x), 0), n_cells - 1)
         low = node_offset(integers, row, n_cells, cell)
         for chord in range(n_chords):
-            if chord > 0 and here[layout.GAP] + meshes.depth[at_depth + chord] > reach:
+            if chord > 0 and here[layout.GAP] + meshes.depth[at_depth + chord] > last:
                 break
             start = chord * layout.PER_CHORD
             for part in range(start, start + layout.PER_CHORD, 2):
@@ -101,7 +101,7 @@ def gather(meshes, mesh, flank, turned, within, pairs):
                 between(meshes.table, at_low, at_high, x - cell, per_cell, here[part:])
             here[start + layout.GAP] += open_by
             here[start + layout.GAP_SLOPE] += tilt
-    return reach - NEAR_CHORD
+    return reach
 
 
 @compiled
@@ -109,14 +109,15 @@ def bearing_chord(pair, depth, local):
     """First column of the chord that bears most where the body stands at ``local`` m, and its
     force, negative where the pair does not touch.
 
-    Chords begin at ``depth`` (chord,) m beyond the gap.
+    Chords begin at ``depth`` (chord,) m beyond the gap, between nodes a little off. Those are left
+    out that begin more than a depth deeper.
     """
     start, touch = 0, local - pair[layout.GAP]
     if not touch > 0.0:
         return start, touch
     most = touch / pair[layout.COMPLIANCE]
     for chord in range(1, len(depth)):
-        if touch < depth[chord] - NEAR_CHORD:
+        if depth[chord] > touch + depth[1]:
             break
         column = chord * layout.PER_CHORD
         bite = local - pair[column + layout.GAP]

@@ -93,6 +93,17 @@ class TestLaw:
         assert_close(law[layout.ALONG], -further / 2e-7, 1e-3, atol=1e-6)
         assert_close(law[layout.FORCE], deeper / 2e-10, 1e-4)
 
+    @pytest.mark.parametrize("turned", [0.65, 1.65, 2.65])
+    def test_the_force_is_convex_between_nodes_too(self, turned):
+        """Chords meet off their depths there; a step of the force would have no equilibrium."""
+        words = ["experiment=helical", "mesh.n_slices=8", "mesh.points_per_pitch=32"]
+        coarse = placed(read_sliced_pair(read_request(words).config).mesh_table(()))
+        approaches = np.linspace(5e-5, 6.5e-5, 751)
+        steps = np.diff([law_at(coarse, turned, at)[0] for at in approaches])
+
+        assert steps.min() > 0.0
+        assert np.diff(steps).min() > -1e-8 * steps.max()
+
     def test_all_chords_of_a_pair_are_damped_by_its_first_touch(self, mesh):
         still = law_at(mesh, 0.4, 3e-5)
         fast = law_at(mesh, 0.4, 3e-5, rate=10.0)
