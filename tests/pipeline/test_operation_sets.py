@@ -1,9 +1,4 @@
-"""Data sets whose speed and load vary: traces in the file, and the commands of the how-to."""
-
-import re
-import shlex
-import subprocess
-from pathlib import Path
+"""Data sets whose speed and load vary: traces in the file."""
 
 import numpy as np
 import pytest
@@ -13,20 +8,6 @@ from small_sets import TINY, make
 
 from gensig.cli import main
 from gensig.dataset.reader import open_dataset
-
-HOWTO = Path(__file__).resolve().parents[2] / "docs" / "howto" / "operation.md"
-BLOCKS = re.findall(
-    r"```sh\n(.*?)```", HOWTO.read_text(encoding="utf-8"), flags=re.DOTALL
-)
-SMALLER = {
-    "plan.n_records=40": "plan.n_records=4",
-    "plan.n_units=10": "plan.n_units=1",
-    "operating.duration_s=6": "operating.duration_s=2",
-}
-LEFT_OUT = (
-    "modification=beihang_even_load",
-    "modification=beihang_both",
-)  # one stands for three
 
 
 @pytest.fixture(scope="module")
@@ -60,17 +41,3 @@ def test_the_configuration_has_the_duration_of_turns(tmp_path):
     assert duration == pytest.approx(1 / 30, abs=1 / 51200)
     assert open_dataset(out).signals(0).shape == (1, 1707)
     assert main(["reproduce", str(out), "--records", "1"]) == 0
-
-
-@pytest.mark.parametrize("block", BLOCKS, ids=range(len(BLOCKS)))
-def test_commands_of_the_howto(block, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for line in block.strip().replace("\\\n", " ").splitlines():
-        if line.startswith("gensig "):
-            typed = [word for word in shlex.split(line)[1:] if word not in LEFT_OUT]
-            words = [SMALLER.get(word, word) for word in typed]
-            if "generate" in words:
-                words.append("executor.n_workers=1")
-            assert main(words) == 0
-        else:
-            subprocess.run(["bash", "-c", line], check=True)

@@ -53,6 +53,11 @@ QUIET: Values = {
 FLAGS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "forced-response": {"--time": ("0.2",), "--sweep": ("1600", "1700", "1")},
     "run-up": {"--against": ("modification=beihang_both",)},
+    "detectability": {
+        "--sizes": ("1", "3"),
+        "--snrs": ("10", "20"),
+        "--speeds": ("600", "1200"),
+    },
     "modify-flank": {"--torques": ("100",), "--misalignments": ("0",)},
 }
 # verb -> flags that are added
@@ -89,14 +94,13 @@ def with_values(words: Sequence[str], values: Values) -> list[str]:
 def _least_set(words: Sequence[str]) -> list[str]:
     values = dict(SETS.get(value_of(words, "experiment"), FEW))
     if value_of(words, "life"):
-        values |= LIVES
-        if value_of(words, "experiment") != "run_to_failure":
-            values["plan.n_units"] = "3"
+        values |= {**LIVES, "plan.n_units": "3"}
     if value_of(words, "plan.n_repeats"):
         values["plan.n_records"] = "48"
     if value_of(words, "operating") or value_of(words, "operating.turns"):
         del values[DURATION]
     if "-m" in words:
+        values["plan.n_records"] = "4"
         del values["plan.n_units"]
     if "--config" in words or value_of(words, "executor.shard_index"):
         return [*words]
@@ -119,6 +123,13 @@ def _least_training(words: Sequence[str]) -> list[str]:
     return with_values(words, values)
 
 
+def _least_course(words: Sequence[str]) -> list[str]:
+    """A record whose speed changes is short, whatever its course lasts."""
+    if value_of(words, "operating"):
+        return with_values(words, {DURATION: "1"})
+    return [*words]
+
+
 def _least_flank(words: Sequence[str]) -> list[str]:
     independent = {
         "mesh.n_slices": "8",
@@ -132,6 +143,8 @@ LEAST = {
     "modify-flank": _least_flank,
     "generate": _least_set,
     "plan": _least_plan,
+    "run-up": _least_course,
+    "simulate": _least_course,
     "train": _least_training,
 }
 
