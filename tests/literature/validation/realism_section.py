@@ -53,19 +53,17 @@ def realism_lines(path: Path = RESULTS) -> list[str]:
     lines = ["", "## Results", "", *_filled(TEXT), "", *_filled(f"Compared: {heading}")]
     lines += _part("Yardstick", YARDSTICK_TEXT, "yardstick", yardstick)
     lines += _part("A healthy recording", RECORDING_TEXT, "recording", channels)
-    return lines + [line for item in _answers(others) for line in _filled(item)]
+    if others:
+        lines += ["", *[line for item in _answers(others) for line in _filled(item)]]
+    return lines
 
 
 def _part(title: str, text: str, figure: str, rows: Sequence[Comparison]) -> list[str]:
-    """One table of the section with its figure and the reasons of its misses."""
+    """One table of the section with its figure."""
     if not rows:
         return []
     picture = f"![{title}: simulated beside measured](../figures/realism_{figure}.png)"
-    lines = ["", f"### {title}", "", *_filled(text), "", picture, "", *_table(rows)]
-    reasons = [
-        f"- {_name(row)} misses: {row.reason}." for row in rows if row.verdict == MISSES
-    ]
-    return [*lines, "", *[line for reason in reasons for line in _filled(reason)]]
+    return ["", f"### {title}", "", *_filled(text), "", picture, "", *_table(rows)]
 
 
 def _table(rows: Sequence[Comparison]) -> list[str]:
