@@ -90,7 +90,9 @@ def _answers(rows: Sequence[Comparison]) -> list[str]:
         if row.verdict in (MISSES, APART):
             named[row.at].append(row.id.removeprefix(f"{RECORDING}."))
     questions = {
-        at: "simulated more than twice as wide" if at == SPREAD else f"{at} told apart by"
+        at: "simulated more than twice as wide"
+        if at == SPREAD
+        else f"{at} told apart by"
         for at in named
     }
     return [
