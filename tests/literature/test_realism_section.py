@@ -12,16 +12,20 @@ def test_section(tmp_path):
     write_results(
         path,
         "a comparison",
-        [compare(measured(), [1.5, 1.6]), compare(measured(id="recording.x"), [9.0])],
+        [
+            compare(measured(), [1.5, 1.6]),
+            compare(measured(id="recording.x", at="channels"), [9.0]),
+            compare(measured(id="recording.x", at="width"), [9.0]),
+        ],
     )
     lines = realism_lines(path)
     assert "Compared: a comparison" in lines
     assert any(
-        line.startswith("| a.b, ms | here | 1 to 2 | 1.55 | ")
-        and " inside | rig |" in line
+        line.startswith("| a.b, ms, here | 1 to 2 | 1.55 [") and "] | inside |" in line
         for line in lines
     )
     assert lines.index("### Yardstick") < lines.index("### A healthy recording")
-    assert {line.count("|") for line in lines if line.startswith("| ")} == {10}
+    assert {line.count("|") for line in lines if line.startswith("| ")} == {5}
+    assert "- simulated more than twice as wide: x." in lines
     write_results(path, "a comparison", [compare(measured(), [1.5])])
     assert "### A healthy recording" not in realism_lines(path)

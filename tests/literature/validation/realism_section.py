@@ -2,43 +2,44 @@
 
 from __future__ import annotations
 
+import math
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
 from gensig.report.realism import (
+    APART,
+    MISSES,
     RECORDING,
     RESULTS,
     Comparison,
     read_results,
-    table,
+    shown_range,
 )
 
+WIDTH = 100
+ALL, CHANNELS, SPREAD = "all conditions", "channels", "width"
+COLUMNS = ("quantity", "measured", "simulated: median [5, 95 %]", "verdict")
+
 TEXT = """\
-Made by `python -m benchmarks.realism --stored`, which simulates the records and stores what it
-finds; this page shows it. No parameter was chosen by these numbers: all ranges of the
-simulation were frozen before, in the commit named here. *Inside*: the central 90 % of the
-simulated values lie within what is beside them; *overlaps*: a part of them; *misses*: none; *no
-value*: nothing could be measured. A miss stays visible, with its reason."""
+Made by `python -m benchmarks.realism --stored`. No parameter was chosen by these numbers: all
+ranges of the simulation were frozen before, in the commit named here. *Inside*: the central 90 % of
+the simulated values lie within the measured range; *overlaps*: a part of them; *misses*: none.
+Every row with its reason, those without a measured range too:
+[realism_results.csv](../../gensig/report/realism_results.csv)."""
 
 YARDSTICK_TEXT = """\
-Beside: published recordings of a two-stage parallel spur gearbox, fault on the intermediate
-shaft, three speeds x two loads x two sensors, 5 kHz, one specimen a class, so that class and
-assembly are confounded and one RMS ratio is known to about 15 %. Ours: every unit runs three
-speeds (1/3, 2/3 and all of the rated) at two torques (10 % and all of the rated), records of at
-least ten turns of the faulted shaft, every sensor, resampled to 5 kHz. Ratios are those of a
-faulty record over the healthy record of *another* specimen in the same gearbox at the same
-speed and torque; `same_unit`: of the same specimen; `full_band`: as simulated, not resampled.
-*Slow and light*: a third of the rated speed and 10 % of the rated torque."""
+Measured: published recordings of a two-stage parallel spur gearbox, fault on the intermediate
+shaft, three speeds x two loads x two sensors, 5 kHz. There is one set of gears a class, so that
+class and assembly are confounded and one RMS ratio is known to about 15 %. *Slow and light*: a
+third of the rated speed and 10 % of the rated torque."""
 
 RECORDING_TEXT = """\
-*Channels*: beside is the range over the channels of one public recording of a healthy pair of
-23 and 46 teeth at 2000 r/min, 25.6 kHz; the verdict says whether the channels lie within the
-simulated 5 to 95 %. Its module, torque, bearings and error grade are not known: assumed, the
-grade as the middle of what the experiment draws. *Width*: the simulated interval over the range
-of the channels, at most 2 asked. *Wrong teeth*, *errors / 3*, *errors x 3*: simulated so on
-purpose, beside the 5 to 95 % of the right simulation; *told apart* where the wrong median lies
-outside. Gain changes none of the indicators; rotation is read off the mesh's phase, in
-simulation and recording alike."""
+Measured: the range over the channels of one public recording of a healthy pair of 23 and 46 teeth
+at 2000 r/min, 25.6 kHz. The verdict says whether the channels lie within the simulated 5 to 95 %.
+Module, torque, bearings and grade of the recorded gears are not known: assumed, the grade as the
+middle of what the experiment draws. *Told apart*: the median of a simulation that is wrong on
+purpose lies outside the 5 to 95 % of the right one."""
 
 
 def realism_lines(path: Path = RESULTS) -> list[str]:
@@ -46,18 +47,15 @@ def realism_lines(path: Path = RESULTS) -> list[str]:
     if not path.exists():
         return []
     heading, rows = read_results(path)
-    lines = [
-        "",
-        "## Results",
-        "",
-        TEXT,
-        "",
-        f"Compared: {heading}",
-    ]
     recording = [row for row in rows if row.id.startswith(RECORDING)]
-    yardstick = [row for row in rows if row not in recording]
+    yardstick = [row for row in rows if row not in recording and shown_range(row)]
+    channels = [row for row in recording if row.at == CHANNELS]
+    others = [row for row in recording if row not in channels]
+    lines = ["", "## Results", "", *_filled(TEXT), "", *_filled(f"Compared: {heading}")]
     lines += _part("Yardstick", YARDSTICK_TEXT, "yardstick", yardstick)
-    lines += _part("A healthy recording", RECORDING_TEXT, "recording", recording)
+    lines += _part("A healthy recording", RECORDING_TEXT, "recording", channels)
+    if others:
+        lines += ["", *[line for item in _answers(others) for line in _filled(item)]]
     return lines
 
 
@@ -66,4 +64,52 @@ def _part(title: str, text: str, figure: str, rows: Sequence[Comparison]) -> lis
     if not rows:
         return []
     picture = f"![{title}: simulated beside measured](../figures/realism_{figure}.png)"
-    return ["", f"### {title}", "", text, "", picture, "", *table(rows)]
+    return ["", f"### {title}", "", *_filled(text), "", picture, "", *_table(rows)]
+
+
+def _table(rows: Sequence[Comparison]) -> list[str]:
+    lines = [f"| {' | '.join(COLUMNS)} |", "|---" * len(COLUMNS) + "|"]
+    for row in rows:
+        values = f"{_number(row.median)} [{_number(row.p5)}, {_number(row.p95)}]"
+        cells = _name(row), shown_range(row), values, row.verdict
+        lines.append(f"| {' | '.join(cells)} |")
+    return lines
+
+
+def _name(row: Comparison) -> str:
+    """Quantity, unit and conditions, where they are not all."""
+    at = "" if row.at in (ALL, CHANNELS) else row.at
+    name = row.id.removeprefix(f"{RECORDING}.")
+    return ", ".join(part for part in (name, row.unit, at) if part)
+
+
+def _answers(rows: Sequence[Comparison]) -> list[str]:
+    """What of the recording is simulated too wide, and what tells a wrong simulation apart."""
+    named: dict[str, list[str]] = {row.at: [] for row in rows}
+    for row in rows:
+        if row.verdict in (MISSES, APART):
+            named[row.at].append(row.id.removeprefix(f"{RECORDING}."))
+    questions = {
+        at: "simulated more than twice as wide"
+        if at == SPREAD
+        else f"{at} told apart by"
+        for at in named
+    }
+    return [
+        f"- {questions[at]}: {', '.join(names) or 'none'}."
+        for at, names in named.items()
+    ]
+
+
+def _filled(text: str) -> list[str]:
+    return textwrap.wrap(
+        " ".join(text.split()),
+        WIDTH,
+        subsequent_indent="  " if text.startswith("- ") else "",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def _number(value: float) -> str:
+    return "none" if math.isnan(value) else f"{value:.3g}"

@@ -1,4 +1,4 @@
-"""The commands and the Python of docs/howto/implants.md, on small files."""
+"""The commands and the Python of docs/howto/bridge.md on implants, on small files."""
 
 import csv
 
@@ -10,7 +10,7 @@ import gensig
 from gensig.cli import main
 from gensig.errors import DatasetError
 
-PAGE = (ROOT / "docs" / "howto" / "implants.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "howto" / "bridge.md").read_text(encoding="utf-8")
 TEETH = (29, 95, 36, 90)
 
 
