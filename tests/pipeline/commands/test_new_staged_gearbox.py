@@ -9,7 +9,6 @@ import sys
 
 import pytest
 import yaml
-from docs_pages import ROOT, blocks, command_lines
 from numpy.testing import assert_allclose
 
 from gensig import open_dataset
@@ -270,12 +269,3 @@ def test_on_a_terminal_it_asks_for_stages(gensig, tmp_path, monkeypatch):
 def test_an_error_of_a_stage_keeps_its_kind():
     with pytest.raises(GensigError, match="stage 1, 29/100: --module 99 must lie in"):
         stage_options(sheet(modules=(99.0, 2.0)))
-
-
-def test_the_howto_shows_what_the_command_prints(gensig):
-    page = (ROOT / "docs/howto/your_gearbox.md").read_text(encoding="utf-8")
-    code = [block.code for block in blocks(page)]
-    (typed,) = [text for text in code if text.startswith("gensig new gearbox reducer2")]
-    (shown,) = [text for text in code if "configs/tables/reducer2_gears.csv" in text]
-    ((_, words),) = command_lines(f"```sh\n{typed}\n```")
-    assert gensig("", *words[1:])[0].strip() == shown.strip()
