@@ -2,7 +2,7 @@
 
 Rates count CPU seconds of one core, the least of several runs; only the lines that say so count
 wall time. Ratios are what compares between machines, and only those of one run. ``--json FILE``
-writes all figures with the machine. What the lines mean: ``docs/howto/speed.md``.
+writes all figures with the machine. What the lines mean: ``docs/howto/cluster.md``.
 """
 
 from __future__ import annotations

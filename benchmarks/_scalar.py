@@ -2,7 +2,7 @@
 write them in Numba.
 
 One record, one number at a time, every table read at every stage, no step taken twice. The
-symbols are those of ``docs/theory/spur_dynamics.md``. Constant speed, drive flanks, and the six
+symbols are those of ``docs/theory/motion.md``. Constant speed, drive flanks, and the six
 degrees of freedom of a pair only.
 """
 

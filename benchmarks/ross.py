@@ -3,7 +3,7 @@ ROSS's motion costs.
 
 Makes ROSS its own virtual environment (about 1.5 GB, kept for the next run), asks it for its
 values, stores them with its version in ``tests/reference/data/ross.csv``, and prints both
-programs' values as Markdown tables. What the differences come from: ``docs/peers.md``. ROSS's
+programs' values as Markdown tables. What the differences come from: ``docs/validation.md``. ROSS's
 ``run_time_response`` with the same gears is timed too; what it takes is stored in
 ``benchmarks/ross_time.json``.
 """

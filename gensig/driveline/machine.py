@@ -2,7 +2,7 @@
 
 Records follow one mesh tooth by tooth. Its ``pair`` is the driving and the driven gear of that
 mesh; ``operating`` is the motion of the driving gear's shaft.
-``docs/theory/shaft_line_records.md``.
+``docs/theory/drive_lines.md``.
 """
 
 from __future__ import annotations

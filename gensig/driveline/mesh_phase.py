@@ -2,7 +2,7 @@
 
 A gear has one set of teeth, so that the phases of its meshes follow from each other by the
 directions of its mates. Angles are those of tooth centres in the common plane, counted against
-the clock; ``docs/theory/shaft_line.md``.
+the clock; ``docs/theory/drive_lines.md``.
 """
 
 from __future__ import annotations

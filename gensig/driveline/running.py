@@ -2,7 +2,7 @@
 
 Meshes are one-sided with backlash, some from tables of their teeth.
 
-``docs/theory/shaft_line_records.md``.
+``docs/theory/drive_lines.md``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The teeth of the meshes of a line: tables of spur and helical pairs, and what a gear takes
 along from mesh to mesh.
 
-``docs/theory/shaft_line_records.md``.
+``docs/theory/drive_lines.md``.
 """
 
 from __future__ import annotations

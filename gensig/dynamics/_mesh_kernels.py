@@ -1,6 +1,6 @@
 """Compiled core: the law of the gear mesh, several records side by side.
 
-The symbols are those of ``docs/theory/spur_dynamics.md``.
+The symbols are those of ``docs/theory/motion.md``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Motion of helical gears along their axes, and their tilts.
 
-Derived in ``docs/theory/helical_dynamics.md``.
+Derived in ``docs/theory/motion.md``.
 """
 
 from __future__ import annotations

@@ -240,7 +240,7 @@ class RunningPair:
         """Equations (1) of the spur paper with corrected signs, motor and load, without the mesh.
 
         Action and reaction on both gears, mesh force driving the wheel:
-        ``docs/theory/spur_dynamics.md``. The soft speed source is not among the springs.
+        ``docs/theory/motion.md``. The soft speed source is not among the springs.
         """
         wheel_speed = 1.0 / self.table.pair.ratio
         gears = ("pinion", self.pinion, 1.0), ("wheel", self.wheel, wheel_speed)

@@ -31,7 +31,7 @@ FRAME = 8192  # signs compared in one transform
 MOST_FRAMES = 64  # of a recording that is asked for
 MOST_PIECES = 768  # stored, of all channels of all recordings: 192 kB
 MOST_CHANNELS = 8
-# Likeness of two pieces: signs alike less signs unlike, over all. docs/howto/implants.md says how
+# Likeness of two pieces: signs alike less signs unlike, over all. docs/howto/bridge.md says how
 # often other recordings of a machine reach it. It grows by what a recording has with itself.
 ALIKE, MARGIN = 0.35, 0.1
 MOST_ELSEWHERE = 32  # pieces compared with other places of their recording

@@ -34,7 +34,7 @@ def set_lines(found: MeasuredSet) -> list[str]:
     lines += _specimen_lines(found)
     lines += [f"missing: {key} ({reason})" for key, reason in found.missing.items()]
     if found.missing:
-        lines.append("give what is missing in measured.yaml: docs/howto/measured.md")
+        lines.append("give what is missing in measured.yaml: docs/howto/predict.md")
     if found.n_others:
         rest = found.n_others - len(found.others)
         more = f" and {rest} more" * (rest > 0)

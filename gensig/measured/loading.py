@@ -74,7 +74,7 @@ def _facts_of(name: str | None, folder: Path) -> SetFacts:
     if name is None and not own.exists():
         raise ConfigError(
             f"{folder} has no {USER_FILE}; name a known set ({', '.join(shipped_names())}), or "
-            "write one: docs/howto/measured.md"
+            "write one: docs/howto/predict.md"
         )
     if name is None:
         return user_facts(own)

@@ -40,7 +40,7 @@ PRINTED = {"flywheel": (15.0, 20.0), "pump gear": (120.0, 125.0)}
 PUMP_DRIVE = 21, 45
 # root stress in MPa without and with dampers
 PRINTED_STRESS = {False: 349.39, True: 292.88}
-# the best ones of the linear search: docs/theory/dampers.md
+# the best ones of the linear search: docs/theory/engine.md
 DAMPERS = (
     "system.dampers=[{node:21,ring_inertia_kg_m2:0.01539,damping_nms_per_rad:6.161,"
     "stiffness_nm_per_rad:245900},{node:45,ring_inertia_kg_m2:0.01138,"

@@ -1,6 +1,6 @@
 """Torsional vibration dampers: a ring on a node of a shaft line, held by a fluid, a spring or both.
 
-``docs/theory/dampers.md``. Source: J. P. Den Hartog, Mechanical Vibrations (1956), 3.2 and 3.3,
+``docs/theory/engine.md``. Source: J. P. Den Hartog, Mechanical Vibrations (1956), 3.2 and 3.3,
 5.4.
 """
 

@@ -3,7 +3,7 @@
 Every rotation counts positive in the sense in which its own node turns, so that speed ratios are
 positive numbers; the sense itself is the sign of ``ShaftLine.speed_ratio``. All inertias and
 stiffnesses are those of their own shaft, none is referred to another one.
-``docs/theory/shaft_line.md``.
+``docs/theory/drive_lines.md``.
 """
 
 from __future__ import annotations

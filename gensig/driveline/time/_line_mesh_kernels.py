@@ -1,7 +1,7 @@
 """Compiled core of a shaft line's gear meshes: the law of one, and the forces of all that agree
 with each other.
 
-The symbols are those of ``docs/theory/shaft_line_integration.md``. Scalar code without
+The symbols are those of ``docs/theory/motion.md``. Scalar code without
 reassociation, own loops instead of library calls: bits depend on nothing but the numbers given.
 """
 

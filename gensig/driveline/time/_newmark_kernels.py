@@ -1,6 +1,6 @@
 """Compiled core: Newmark's average acceleration for a geared shaft line.
 
-The symbols are those of ``docs/theory/shaft_line_integration.md``. Scalar code without
+The symbols are those of ``docs/theory/motion.md``. Scalar code without
 reassociation, own loops instead of library calls: bits depend on nothing but the numbers given.
 """
 

@@ -1,7 +1,7 @@
 """Integrate a geared shaft line in time: Newmark's average acceleration, contact converged in
 every step.
 
-Formulas and what is measured of them: ``docs/theory/shaft_line_integration.md``.
+Formulas and what is measured of them: ``docs/theory/motion.md``.
 """
 
 from __future__ import annotations

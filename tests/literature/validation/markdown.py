@@ -112,17 +112,17 @@ SOURCE_TEXTS = {
     "engine_response": (
         "1688 r/min, 12.68 kN m, linear: meshes never part. The paper prints no size, "
         "pressure, cam, pump or firing order; all are assumed (`excitation=engine_v20`, "
-        "docs/theory/engine_excitation.md), none is tuned. Two firing orders: `least_couples` "
+        "docs/theory/engine.md), none is tuned. Two firing orders: `least_couples` "
         "of the crank, the default, and `in_sequence`."
     ),
     "engine_dampers": (
         "The same, with ISO's root stress of the pump gear under the greatest tooth force of "
         "a cycle, and dampers on both gears of the pump drive, whose sizes the paper does not "
-        "print (docs/theory/dampers.md). Waterfalls are steady at every speed, by 10 r/min."
+        "print (docs/theory/engine.md). Waterfalls are steady at every speed, by 10 r/min."
     ),
     "engine_time": (
         "1688 r/min and 12.68 kN m again, integrated for 2 s with backlash, spur meshes by "
-        "tables of their teeth (docs/theory/shaft_line_in_time.md). Numbers are medians over "
+        "tables of their teeth (docs/theory/engine.md). Numbers are medians over "
         "28 cycles of the crank. The drive rattles and is chaotic: they scatter by some per "
         "cent with the last bit, so they are given to two digits (`~`), and 15 % is accepted."
     ),

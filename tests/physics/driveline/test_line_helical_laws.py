@@ -105,7 +105,7 @@ def test_the_flywheel_hardly_feels_constant_stiffness():
 def test_our_stiffness_is_of_the_size_of_the_tables():
     """0.97 times the printed one where that is out of line, 1.3 to 1.8 elsewhere.
 
-    docs/theory/shaft_line_records.md.
+    docs/theory/drive_lines.md.
     """
     line, _, tabulated = running("false", "sliced")
     meshes = line.machine.drive.line.meshes

@@ -33,7 +33,7 @@ from gensig.dataset.schema import SIGNALS
 from gensig.errors import ConfigError
 
 FAST = (*QUICK, "protocols=[by_unit]", "baselines=[rms_threshold]")
-HOWTO = Path(__file__).parents[3] / "docs" / "howto" / "controls.md"
+HOWTO = Path(__file__).parents[3] / "docs" / "howto" / "report.md"
 
 
 def small(**changes):

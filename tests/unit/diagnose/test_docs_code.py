@@ -30,7 +30,7 @@ def test_a_model_of_the_user_learns_and_is_judged_on_unseen_units(monkeypatch, c
     data = FakeDataset(**shape, noise=0.2, classes=(*CLASSES, "wear"))
     data.protocols = ("new_machine",)
     monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path, **_: data)
-    names = run_page("train_your_model.md")
+    names = run_page("models.md")
     shown = capsys.readouterr().out
     assert float(shown.rsplit(":", 1)[1]) > 0.45  # chance is 0.2
     assert shown.count(" of 8: training loss") == 8

@@ -29,7 +29,7 @@ OF_MEASURED = (
     "gensig/commands/sets/measured.py",
     "diagnose/bridge/",
 )
-OTHER_PAGES = ("realism.md", "measured.md", "peers.md", "reliability.md")
+OTHER_PAGES = ("realism.md", "reliability.md")
 
 
 def refused(text: str) -> list[str]:

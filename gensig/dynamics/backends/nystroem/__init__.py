@@ -1,1 +1,1 @@
-"""The method with two evaluations of the mesh law a step; ``docs/theory/two_evaluations.md``."""
+"""The method with two evaluations of the mesh law a step; ``docs/theory/motion.md``."""

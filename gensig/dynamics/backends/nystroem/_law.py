@@ -1,6 +1,6 @@
 """Two-evaluation core: the one-sided law of three pairs of teeth.
 
-The symbols are those of ``docs/theory/spur_dynamics.md``.
+The symbols are those of ``docs/theory/motion.md``.
 """
 
 from __future__ import annotations
