@@ -11,10 +11,8 @@ COMMAND = re.compile(r"python\s+-m\s+(benchmarks(?:\.\w+)?)([^`\n#;,|]*)")
 QUICK = {
     "benchmarks": ("--quick",),
     "benchmarks.accuracy": ("--duration", "0.02", "--steps", "4"),
-    "benchmarks.contact_law": ("--quick",),
     "benchmarks.gearbox_levels": ("--quick",),
     "benchmarks.many_records": ("--records", "8"),
-    "benchmarks.mesh_tables": ("--runs", "1"),
     "benchmarks.mutants": ("--stored",),
     "benchmarks.replay_rate": ("--quick",),
     "benchmarks.ross": ("--stored",),
@@ -25,7 +23,6 @@ QUICK = {
     ),
     "benchmarks.stages": ("--quick",),
     "benchmarks.stiffness_time": ("--contacts", "2", "--runs", "1"),
-    "benchmarks.storage": ("--records", "4", "--runs", "1"),
     "benchmarks.vector_widths": ("--quick",),
 }
 # name -> test that runs its parts: trainings and campaigns, of which the least takes minutes

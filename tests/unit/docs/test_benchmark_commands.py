@@ -12,7 +12,6 @@ from docs_pages import ROOT
 # each compiles kernels of its own, or begins processes
 SLOW = {
     "benchmarks",
-    "benchmarks.contact_law",
     "benchmarks.scaling",
     "benchmarks.many_records",
     "benchmarks.shaft_line",
