@@ -143,7 +143,6 @@ LEAST = {
     "modify-flank": _least_flank,
     "generate": _least_set,
     "plan": _least_plan,
-    "run-up": _least_course,
     "simulate": _least_course,
     "train": _least_training,
 }
