@@ -25,7 +25,7 @@ from diagnose.networks.domain import (
     neighbor_distance,
 )
 from diagnose.scoring.metrics import over_records
-from diagnose.scoring.predictions import Rows
+from diagnose.scoring.predictions import Outcome, Rows
 from diagnose.settings import TrainSettings
 from diagnose.training.autoencoder import fit_autoencoder, reconstruction_error
 from diagnose.training.classes import Classes, predict_windows
@@ -49,21 +49,16 @@ SCORE_LABELS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NoveltyRun:
+class NoveltyRun(Outcome):
     """Scores of novelty of the test records of a protocol, by one method and seed.
 
     Attributes
     ----------
-    record, score : (record,) of the test part
+    score : (record,) of the test part
     validation_score : (record,) of the validation part, whose classes are those of the training
     predicted : (record,) labels of a network that tells known classes apart; None of other methods
     """
 
-    protocol: str
-    method: str
-    seed: int
-    detail: str
-    record: IntArray
     score: FloatArray
     validation_score: FloatArray
     predicted: IntArray | None = None

@@ -8,12 +8,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from diagnose.data.teeth import common_teeth, teeth_range
 from diagnose.data.windows import Task, subset_segments
+from diagnose.scoring.predictions import Outcome
 from diagnose.settings import TrainSettings
 from diagnose.training.carried import Carried, carried_from, carried_in
 from diagnose.training.description_checks import OPTIONAL, REQUIRED, SCHEDULE
@@ -117,43 +118,18 @@ class ModelDescription:
         return self.files is not None
 
 
-class Trained(Protocol):
-    """Facts of a trained network for its description."""
-
-    @property
-    def protocol(self) -> str:
-        """Split of the training."""
-
-    @property
-    def seed(self) -> int:
-        """Seed of the training."""
-
-    @property
-    def best_epoch(self) -> int:
-        """Epoch of the stored weights."""
-
-    @property
-    def domain(self) -> Domain | None:
-        """Domain of the training windows."""
-
-    @property
-    def temperature(self) -> float:
-        """Temperature of the probabilities."""
-
-
 def model_description(
-    task: Task, settings: TrainSettings, prediction: Trained
+    task: Task, settings: TrainSettings, run: Outcome
 ) -> ModelDescription:
-    """Description of the network behind a prediction."""
-    trained_on = subset_segments(task, prediction.protocol, "train").record
+    """Description of the network behind answers."""
+    trained_on = subset_segments(task, run.protocol, "train").record
     channels, tested = (
-        task.part(prediction.protocol, subset).channel_names
-        for subset in ("train", "test")
+        task.part(run.protocol, subset).channel_names for subset in ("train", "test")
     )
     speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)[trained_on]
     facts = None
-    if prediction.domain is not None:
-        facts = prediction.domain.facts()
+    if run.domain is not None:
+        facts = run.domain.facts()
     return ModelDescription(
         model_schema_version=MODEL_SCHEMA_VERSION,
         model=dict(settings.model),
@@ -165,17 +141,17 @@ def model_description(
         normalise=task.normalise,
         data_schema_version=schema_version(task.dataset),
         data_fingerprint=data_fingerprint(task.dataset),
-        protocol=prediction.protocol,
-        seed=prediction.seed,
-        best_epoch=prediction.best_epoch,
+        protocol=run.protocol,
+        seed=run.seed,
+        best_epoch=run.best_epoch,
         n_bootstrap=settings.n_bootstrap,
         speed_rpm_range=(float(speed.min()), float(speed.max())),
         n_teeth=common_teeth(task.dataset),
         n_teeth_range=teeth_range(task.dataset),
         out_of_distribution=facts,
-        temperature=prediction.temperature,
+        temperature=run.temperature,
         test_channel_names=None if tested == channels else tested,
-        carried=carried_in(task, prediction.protocol),
+        carried=carried_in(task, run.protocol),
     )
 
 
@@ -201,7 +177,7 @@ def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
         lives, or weights that are damaged or do not belong to the network
     ConfigError     for parameters that no network takes
     """
-    from diagnose.networks.registry import build_model, input_of
+    from diagnose.networks.registry import build_model
 
     folder = Path(folder)
     description = read_description(folder)
@@ -218,13 +194,16 @@ def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
             n_classes=len(description.class_names),
         )
 
-    model = with_weights(build, folder)
-    check_answers(model, input_of, description, folder)
-    return model, description
+    return with_weights(build, description, folder), description
 
 
-def with_weights(build: Callable[[], Built], folder: Path) -> Built:
-    """Network in evaluation mode with the weights of a folder.
+def with_weights(
+    build: Callable[[], Built],
+    description: ModelDescription,
+    folder: Path,
+    further: Sequence[np.ndarray] = (),
+) -> Built:
+    """Network in evaluation mode with the weights of a folder, which is tried as `check_answers`.
 
     It is built without memory first, so that absurd sizes are refused before they are allocated.
 
@@ -233,6 +212,8 @@ def with_weights(build: Callable[[], Built], folder: Path) -> Built:
     DatasetError    for weights that are damaged or do not belong to the network
     """
     import torch
+
+    from diagnose.networks.registry import input_of
 
     with torch.device("meta"):
         planned = build().state_dict()
@@ -243,7 +224,8 @@ def with_weights(build: Callable[[], Built], folder: Path) -> Built:
     tensors = tensors_of(folder, expected)
     model = build()
     model.load_state_dict({name: torch.from_numpy(tensors[name]) for name in expected})
-    return model.eval()
+    check_answers(model.eval(), input_of, description, folder, further)
+    return model
 
 
 def check_answers(
