@@ -36,9 +36,10 @@ from diagnose.studies.life_study import (
 )
 from diagnose.studies.protocol_results import BOOTSTRAP_SEED
 from diagnose.studies.result_files import Content
-from diagnose.training.life_store import AGE, LifeFacts, load_life_model
+from diagnose.training.life_facts import AGE, LifeFacts
 from diagnose.training.remaining_life import (
     LifeNetwork,
+    load_life_model,
     shares_of_records,
     shares_of_windows,
 )

@@ -91,7 +91,37 @@ class ClassReport(Report):
 
     def sections(self, folder: Path) -> list[Section]:
         """Answers first, then scores, controls and caveats."""
-        sections = _sections(folder, self.metrics)
+        metrics = self.metrics
+        ordered = _ordered(metrics)
+        clean = {name: result for name, result in ordered if not result["leaky"]}
+        novelty = metrics["novelty"]
+        warnings = [("", line) for line in caveats(metrics)]
+        sections = [fault_section(metrics)]
+        if ordered:
+            sections += _score_sections(folder, metrics, ordered)
+        if clean:
+            sections.append(_fault_section(clean, metrics))
+            sections += answer_sections(folder, clean)
+        sections += novelty_sections(novelty)
+        if ordered:
+            sections.append(controls_section(metrics))
+        sections.append(Section(title="Caveats", notes=warnings))
+        if ordered:
+            sections.append(_meaning_section(metrics, clean))
+        if clean:
+            sections.append(_trust_section(folder, clean))
+        sections.append(_confusion_section(folder, metrics, ordered))
+        files = {
+            name: text
+            for name, text in FILES.items()
+            if novelty or name != "novelty.csv"
+        }
+        sections.append(files_section(files))
+        sections = [
+            section
+            for section in sections
+            if section.text or section.table or section.notes or section.figures
+        ]
         if self.pictures:
             sections.insert(2, _pictures_section(self.pictures))
         return sections
@@ -179,38 +209,6 @@ def _score_table(metrics: Content) -> Table:
 
 def _has(metrics: Content, method: str) -> bool:
     return any(method in result["methods"] for result in metrics["protocols"].values())
-
-
-def _sections(folder: Path, metrics: Content) -> list[Section]:
-    """Sections of the page; their figures are written into the folder."""
-    ordered = _ordered(metrics)
-    clean = {name: result for name, result in ordered if not result["leaky"]}
-    novelty = metrics["novelty"]
-    warnings = [("", line) for line in caveats(metrics)]
-    sections = [fault_section(metrics)]
-    if ordered:
-        sections += _score_sections(folder, metrics, ordered)
-    if clean:
-        sections.append(_fault_section(clean, metrics))
-        sections += answer_sections(folder, clean)
-    sections += novelty_sections(novelty)
-    if ordered:
-        sections.append(controls_section(metrics))
-    sections.append(Section(title="Caveats", notes=warnings))
-    if ordered:
-        sections.append(_meaning_section(metrics, clean))
-    if clean:
-        sections.append(_trust_section(folder, clean))
-    sections.append(_confusion_section(folder, metrics, ordered))
-    files = {
-        name: text for name, text in FILES.items() if novelty or name != "novelty.csv"
-    }
-    sections.append(files_section(files))
-    return [
-        section
-        for section in sections
-        if section.text or section.table or section.notes or section.figures
-    ]
 
 
 def _score_sections(folder: Path, metrics: Content, ordered: Entries) -> list[Section]:

@@ -64,21 +64,20 @@ ClassOutcome = Prediction | NoveltyRun
 
 
 def run_job(task: Task, settings: TrainSettings, job: Job) -> list[ClassOutcome]:
-    """Predictions, or scores of novelty, on the test part of each of the job's protocols."""
+    """Predictions, or scores of novelty, on the test part of each of the job's protocols.
+
+    Those on the sham data set have names of their own.
+    """
     first = job.protocols[0]
     if first in OPEN_PROTOCOLS:
         return [*_novelty_runs(task, settings, first, job.seed)]
-    if job.sham:
-        return [*_on_sham(task, settings, job)]
-    return [*_predictions(task, settings, job)]
-
-
-def _on_sham(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
-    """Predictions of a job on the sham data set, under names of their own."""
-    network = network_name(settings)
+    if not job.sham:
+        return [*_predictions(task, settings, job)]
+    folder, network = str(settings.sham), network_name(settings)
+    sham = once("sham", folder, lambda: sham_task(task, folder))
     return [
         replace(run, method=sham_method(run.method, network))
-        for run in _predictions(_sham(task, settings), settings, job)
+        for run in _predictions(sham, settings, job)
     ]
 
 
@@ -268,9 +267,3 @@ def _subsets(
     if inputs.compares or control == ORACLE or protocol in OPEN_PROTOCOLS:
         return SUBSETS
     return subsets_of(task, protocol)
-
-
-def _sham(task: Task, settings: TrainSettings) -> Task:
-    """The task on the sham data set, opened once a process."""
-    folder = str(settings.sham)
-    return once("sham", folder, lambda: sham_task(task, folder))

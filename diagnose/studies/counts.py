@@ -8,12 +8,14 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.data.windows import SUBSETS, Task, subset_segments
+from diagnose.data.windows import (
+    SUBSETS,
+    IntArray,
+    Task,
+    subset_segments,
+)
 from diagnose.scoring.metrics import confusion_by_unit
 from diagnose.scoring.predictions import Outcome
-
-IntArray = NDArray[np.integer]
-
 
 AnyRun = TypeVar("AnyRun", bound=Outcome)
 

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnose.baselines.features import Cache
 from diagnose.baselines.life_models import (
@@ -27,21 +26,25 @@ from diagnose.data.lives import (
     life_segments,
     lives_of,
 )
-from diagnose.data.windows import SUBSETS, Segments, Task
+from diagnose.data.windows import (
+    SUBSETS,
+    FloatArray,
+    IntArray,
+    Segments,
+    Task,
+)
 from diagnose.networks.domain import fit_domain
 from diagnose.networks.registry import input_of
 from diagnose.scoring.life_scores import conformal_half_width
 from diagnose.scoring.predictions import Outcome
 from diagnose.settings import TrainSettings
 from diagnose.studies.counts import n_different
-from diagnose.studies.jobs import Job, once
+from diagnose.studies.jobs import once
 from diagnose.studies.result_files import network_name
-from diagnose.training.life_store import AGE, LifeFacts
+from diagnose.training.life_facts import AGE, LifeFacts
 from diagnose.training.remaining_life import RemainingLife, shares_of_records
 from diagnose.training.train import train_network
 
-FloatArray = NDArray[np.floating]
-IntArray = NDArray[np.integer]
 AGE_ONLY, CONSTANT, INDICATORS = "age_only", "constant", "indicators"
 AND_AGE = "_and_age"
 
@@ -139,17 +142,10 @@ def life_sets(task: Task, settings: TrainSettings, protocol: str) -> LifeSets:
     )
 
 
-def run_life_job(task: Task, settings: TrainSettings, job: Job) -> list[LifePrediction]:
-    """Predictions on the test part of a protocol, of the baselines or, with a seed, of networks."""
-    sets = life_sets(task, settings, job.protocols[0])
-    if job.seed is None:
-        return _baselines(task, settings, sets)
-    return _networks(task, settings, sets, job.seed)
-
-
-def _baselines(
+def life_baselines(
     task: Task, settings: TrainSettings, sets: LifeSets
 ) -> list[LifePrediction]:
+    """Predictions of the constant, the age alone and indicators."""
     lives, parts, share = sets.lives, sets.parts, sets.share
     train = parts["train"].record
     usual = constant_regression(share[train], lives.name[train])
@@ -182,12 +178,10 @@ def _baselines(
     return predictions
 
 
-def _networks(
-    task: Task,
-    settings: TrainSettings,
-    sets: LifeSets,
-    seed: int,
+def life_networks(
+    task: Task, settings: TrainSettings, sets: LifeSets, seed: int
 ) -> list[LifePrediction]:
+    """Predictions of networks that are trained with a seed, without and with the age."""
     load, lives = input_of(settings.model).load, sets.lives
     windows = once(
         "inputs",

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import ClassVar, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnose.data.lives import (
     Lives,
@@ -16,7 +16,12 @@ from diagnose.data.lives import (
     life_segments,
     lives_of,
 )
-from diagnose.data.windows import SUBSETS, Task
+from diagnose.data.windows import (
+    SUBSETS,
+    FloatArray,
+    IntArray,
+    Task,
+)
 from diagnose.networks.domain import Domain
 from diagnose.scoring.life_scores import (
     UNITS,
@@ -31,16 +36,18 @@ from diagnose.scoring.machines import LIVES, Machines, machines_of
 from diagnose.settings import BOTH, TrainSettings
 from diagnose.studies.counts import by_method, n_different, run_notes
 from diagnose.studies.jobs import Job, LearningStudy, Plan
-from diagnose.studies.life_jobs import AGE_ONLY, LifePrediction, run_life_job
+from diagnose.studies.life_jobs import (
+    AGE_ONLY,
+    LifePrediction,
+    life_baselines,
+    life_networks,
+    life_sets,
+)
 from diagnose.studies.protocol_results import BOOTSTRAP_SEED
 from diagnose.studies.result_files import Entry, save_network, write_rows
 from diagnose.studies.study import check_network
-from diagnose.training.life_store import LifeFacts
+from diagnose.training.life_facts import LifeFacts
 from gensig.errors import ConfigError
-
-FloatArray = NDArray[np.floating]
-IntArray = NDArray[np.integer]
-
 
 REFUSED = ("heads", "sham", "test_channels", "tensorboard")  # settings
 
@@ -85,7 +92,11 @@ class LifeStudy(LearningStudy[LifePrediction]):
 
     def run_job(self, job: Job) -> list[LifePrediction]:
         """Predictions of the baselines or, with a seed, of networks."""
-        return run_life_job(self.task, self.settings, job)
+        task, settings = self.task, self.settings
+        sets = life_sets(task, settings, job.protocols[0])
+        if job.seed is None:
+            return life_baselines(task, settings, sets)
+        return life_networks(task, settings, sets, job.seed)
 
     def progress(self, runs: Sequence[LifePrediction]) -> str:
         """Line on a finished job."""
@@ -94,11 +105,8 @@ class LifeStudy(LearningStudy[LifePrediction]):
 
     def save(self, folder: Path, run: LifePrediction) -> None:
         """Write a network with the facts of its hours."""
-        if run.facts is not None:
-            name, facts = f"{run.protocol}-{run.method}", asdict(run.facts)
-            save_network(
-                folder, name, self.task, self.settings, run, remaining_life=facts
-            )
+        name, task = f"{run.protocol}-{run.method}", self.task
+        save_network(folder, name, task, self.settings, run, remaining_life=run.facts)
 
     def results(
         self, folder: Path, plan: Plan, runs: Sequence[LifePrediction]
@@ -147,23 +155,23 @@ def _result(
     runs = by_method(predictions, protocol)
     tables = {name: measured(lives, of_seeds) for name, of_seeds in runs.items()}
     machines = machines_of_lives(task, lives, runs[AGE_ONLY][0].record)
-    n_bootstrap = settings.n_bootstrap
     methods = {}
     for name, of_seeds in runs.items():
-        rng = np.random.default_rng(BOOTSTRAP_SEED)
-        scores = life_scores(
-            tables[name], machines=machines, n_bootstrap=n_bootstrap, rng=rng
-        )
-        scores["gain_over_age_only_h"] = gain(
-            tables[name]["rmse_h"],
-            tables[AGE_ONLY]["rmse_h"],
-            machines=machines,
-            n_bootstrap=n_bootstrap,
-            rng=np.random.default_rng(BOOTSTRAP_SEED),
+        score, better = (
+            partial(
+                function,
+                machines=machines,
+                n_bootstrap=settings.n_bootstrap,
+                rng=np.random.default_rng(BOOTSTRAP_SEED),
+            )
+            for function in (life_scores, gain)
         )
         below = [below_bound(lives, run) for run in of_seeds]
         methods[name] = {
-            **scores,
+            **score(tables[name]),
+            "gain_over_age_only_h": better(
+                tables[name]["rmse_h"], tables[AGE_ONLY]["rmse_h"]
+            ),
             "half_width_h": [run.half_width for run in of_seeds],
             "censored_below_bound": float(np.mean(below)),
             **run_notes(of_seeds),

@@ -16,7 +16,14 @@ from numpy.typing import NDArray
 from torch import nn
 
 from diagnose.baselines.features import FeatureTable, feature_table
-from diagnose.data.windows import SUBSETS, Task, WindowSet, subset_segments
+from diagnose.data.windows import (
+    SUBSETS,
+    FloatArray,
+    IntArray,
+    Task,
+    WindowSet,
+    subset_segments,
+)
 from diagnose.networks.calibration import probabilities
 from diagnose.networks.domain import (
     MOST_WINDOWS,
@@ -31,8 +38,6 @@ from diagnose.training.autoencoder import fit_autoencoder, reconstruction_error
 from diagnose.training.classes import Classes, predict_windows
 from diagnose.training.train import train_network
 
-FloatArray = NDArray[np.floating]
-IntArray = NDArray[np.integer]
 SITES = 3  # axes (window, site, feature) of the features of a network that scores sites
 # Names of the scores in metrics.json, and their labels on the page.
 SCORE_LABELS = {

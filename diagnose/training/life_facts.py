@@ -1,26 +1,12 @@
-"""Stored networks of remaining lives: the files of a classifier, with hours and intervals."""
+"""Facts of a stored network of remaining lives: its hours, intervals and inputs."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import Any
 
 from diagnose.scoring.life_scores import intervals_hold
 from diagnose.training.description_checks import LIFE, LIFE_COLUMNS
-from diagnose.training.model_files import DESCRIPTION, one_line
-from diagnose.training.store import (
-    ModelDescription,
-    read_description,
-    with_weights,
-)
-from gensig.errors import DatasetError
-
-if TYPE_CHECKING:
-    from diagnose.training.remaining_life import LifeNetwork
 
 AGE = "life_time_h"
 
@@ -70,43 +56,6 @@ class LifeFacts:
         return intervals_hold(self.n_calibration_lives, self.coverage)
 
 
-def load_life_model(
-    folder: str | Path,
-) -> tuple[LifeNetwork, ModelDescription, LifeFacts]:
-    """Network in evaluation mode, its description, and the facts of its hours.
-
-    Raises
-    ------
-    DatasetError    for a folder without the two files, another schema, a classifier, or weights
-        that do not belong to the network
-    """
-    from diagnose.training.remaining_life import LifeNetwork
-
-    folder = Path(folder)
-    description = read_description(folder)
-    if description.remaining_life is None:
-        raise DatasetError(
-            f"{folder} is a classifier and says no remaining life: "
-            "train with task=remaining_life"
-        )
-    facts = _facts(folder, description.remaining_life)
-    n_told = len(facts.told)
-    ones = [1.0] * len(description.channel_names)
-
-    def build() -> LifeNetwork:
-        told = np.zeros(n_told), np.ones(n_told)
-        return LifeNetwork(description.network, ones, *told)
-
-    silent = np.zeros((1, n_told), np.float32)
-    return with_weights(build, description, folder, (silent,)), description, facts
-
-
-def _facts(folder: Path, content: Mapping[str, Any]) -> LifeFacts:
-    try:
-        values = LIFE("remaining_life", content)
-        return LifeFacts(**values)
-    except (TypeError, ValueError) as error:
-        reason = one_line(error)
-        raise DatasetError(
-            f"{folder / DESCRIPTION} does not describe a model of remaining lives: {reason}"
-        ) from None
+def life_facts(name: str, value: Any) -> LifeFacts:
+    """Facts of the content of ``model.json``."""
+    return LifeFacts(**LIFE(name, value))
