@@ -67,7 +67,7 @@ class ModelDescription:
     temperature : see `diagnose.networks.calibration`; 1 in older models
     test_channel_names : of protocol cross_sensor
     adaptation : method and recordings of a model that a version before 0.15 adapted; else None
-    test_score : see `diagnose.studies.study.test_score`; None in older models
+    test_score : see `diagnose.studies.protocol_results.test_score`; None in older models
     remaining_life : None for a classifier
     carried : blocks of recordings that carried implants; None for a network of any other data set,
         and in older models
