@@ -16,6 +16,7 @@ from diagnose.networks.domain import METHOD, QUANTILE, TENSOR
 from diagnose.networks.registry import build_model
 from diagnose.recordings.registry import shipped_network
 from diagnose.recordings.tooth_classifier import ARRAYS, TOOTH_KIND
+from diagnose.training.life_facts import LifeFacts
 from diagnose.training.model_files import MODEL_SCHEMA_VERSION
 from diagnose.training.remaining_life import LifeNetwork
 from diagnose.training.store import ModelDescription, save_model
@@ -82,15 +83,15 @@ def make_models(folder: Path) -> None:
     save_model(folder / "cnn", _arrays(network) | domain, described)
     zero, one = np.zeros(len(TOLD)), np.ones(len(TOLD))
     life = LifeNetwork(Section("model", CNN), [1.0], zero, one)
-    hours = {
-        "method": "cnn",
-        "early_life_h": 100.0,
-        "half_width_h": 20.0,
-        "coverage": 0.8,
-        "n_calibration_lives": 9,
-        "told": list(TOLD),
-        "told_range": {"speed_rpm": [1000.0, 2000.0], "torque_nm": [10.0, 30.0]},
-    }
+    hours = LifeFacts(
+        method="cnn",
+        early_life_h=100.0,
+        half_width_h=20.0,
+        coverage=0.8,
+        n_calibration_lives=9,
+        told=TOLD,
+        told_range={"speed_rpm": (1000.0, 2000.0), "torque_nm": (10.0, 30.0)},
+    )
     described = _description(model=CNN, out_of_distribution=flag, remaining_life=hours)
     save_model(folder / "hours", _arrays(life) | domain, described)
     n_features, n = 2 * len(GEAR_FEATURES), len(CLASSES)

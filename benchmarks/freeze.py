@@ -20,9 +20,9 @@ from diagnose.baselines.base import Role
 from diagnose.baselines.registry import baseline_names
 from diagnose.studies.baseline_runs import LABEL_SHUFFLE
 from diagnose.studies.benchmark import Benchmark, sha256, signal_rms
+from diagnose.studies.class_jobs import ORACLE_NETWORK
 from diagnose.studies.controls import is_sham
-from diagnose.studies.jobs import ORACLE_NETWORK
-from diagnose.studies.study import is_leaky
+from diagnose.studies.protocol_results import is_leaky
 from gensig.dataset.reader import open_dataset
 
 FOLDER = Path(__file__).parents[1] / "diagnose" / "frozen"

@@ -33,7 +33,7 @@ from diagnose.scoring.metrics import (
     score_with_interval,
 )
 from diagnose.settings import TrainSettings, settings_from
-from diagnose.studies.jobs import with_reference
+from diagnose.studies.class_jobs import with_reference
 from diagnose.studies.study import task_from
 from diagnose.training.classes import Classes, predict_windows
 from diagnose.training.train import train_network

@@ -167,15 +167,20 @@ def _fitted(
 
 
 def _logistic(strength: float) -> Any:
-    from sklearn.impute import SimpleImputer
     from sklearn.linear_model import LogisticRegression
+
+    model = LogisticRegression(C=strength, max_iter=2000, class_weight="balanced")
+    return scaled(model)
+
+
+def scaled(model: Any) -> Any:
+    """An estimator behind the filling and scaling of columns."""
+    from sklearn.impute import SimpleImputer
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
 
-    model = LogisticRegression(C=strength, max_iter=2000, class_weight="balanced")
-    return make_pipeline(
-        SimpleImputer(keep_empty_features=True), StandardScaler(), model
-    )
+    imputer = SimpleImputer(keep_empty_features=True)
+    return make_pipeline(imputer, StandardScaler(), model)
 
 
 def _boosting() -> Any:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.baselines.estimators import BOOSTING, known_columns
+from diagnose.baselines.estimators import BOOSTING, known_columns, scaled
 from diagnose.baselines.features import Cache, feature_table
 from diagnose.data.lives import Lives, balanced_weights
 from diagnose.data.windows import FloatArray, IntArray, Segments, Task
@@ -118,16 +118,15 @@ def fit_regression(
 def _candidates() -> dict[str, tuple[Any, str]]:
     """Name -> untrained model and its argument for weights; the first wins ties."""
     from sklearn.ensemble import HistGradientBoostingRegressor
-    from sklearn.impute import SimpleImputer
     from sklearn.linear_model import Ridge
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import StandardScaler
 
-    candidates: dict[str, tuple[Any, str]] = {}
-    for penalty in PENALTIES:
-        imputer = SimpleImputer(keep_empty_features=True)
-        model = make_pipeline(imputer, StandardScaler(), Ridge(alpha=penalty))
-        candidates[f"ridge, penalty {penalty:g}"] = model, "ridge__sample_weight"
+    candidates: dict[str, tuple[Any, str]] = {
+        f"ridge, penalty {penalty:g}": (
+            scaled(Ridge(alpha=penalty)),
+            "ridge__sample_weight",
+        )
+        for penalty in PENALTIES
+    }
     boosting = HistGradientBoostingRegressor(
         max_iter=100, max_leaf_nodes=8, learning_rate=0.1, random_state=0
     )

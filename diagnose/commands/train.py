@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -164,7 +163,7 @@ def train_one(study: Study) -> None:
     settings = settings_from(Configuration(study.config))
     out = Path(settings.out)
     try:
-        page, lines = STUDIES[settings.task](settings, study)
+        page, lines = make_report(settings, study)
     except KeyboardInterrupt:
         if not holds_study(out):
             raise Interrupted("run the same command again") from None
@@ -175,73 +174,31 @@ def train_one(study: Study) -> None:
     show(f"report: {page}")
 
 
-def _study_classes(settings: TrainSettings, study: Study) -> tuple[Path, list[str]]:
-    """Page and tables of a study that tells classes apart."""
-    from diagnose.data.protocols import choose_protocols
-    from diagnose.recordings.found_faults import found_fault_pictures
-    from diagnose.report.headlines import headline_protocol, headlines
-    from diagnose.report.novelty_report import novelty_tables
-    from diagnose.report.page import result_table, without_interval, write_report
-    from diagnose.studies.study import baselines_left_out, plan_study, run_study
+def make_report(settings: TrainSettings, asked: Study) -> tuple[Path, list[str]]:
+    """Page and tables of a study, which is written into its folder."""
+    from diagnose.data.protocols import left_out_lines
+    from diagnose.progress import progress
+    from diagnose.recordings.registry import TARGETS
+    from diagnose.studies.study import run_study
     from diagnose.training.study_folder import complete_study, study_at_work
 
+    target = TARGETS[settings.task]
+    target.study.check(settings)
     task, settings = _opened(settings)
     out = Path(settings.out)
-    protocols, jobs = plan_study(task, settings)
-    left_out = choose_protocols(task, settings.protocols)[1]
-    for name, reason in baselines_left_out(task, settings, protocols).items():
+    study = target.study(task=task, settings=settings)
+    plan = study.plan()
+    for name, reason in plan.baselines_left_out.items():
         tell(f"baseline {name} is left out of {reason}")
-    with study_at_work(out, study) as kept_in:
-        with _progress(len(jobs), left_out) as on_done:
-            metrics = run_study(
-                task,
-                settings,
-                out,
-                protocols=protocols,
-                jobs=jobs,
-                kept_in=kept_in,
-                on_done=on_done,
-            )
-        shown: list[tuple[str, str]] = []
-        if protocol := headline_protocol(metrics):
-            shown = found_fault_pictures(out, task, protocol, metrics["model"])
-        page = write_report(out, metrics, shown)
+    with study_at_work(out, asked) as kept_in:
+        for line in left_out_lines(plan.left_out):
+            tell(line)
+        with progress(len(plan.jobs)) as on_done:
+            metrics, runs = run_study(study, plan, kept_in=kept_in, on_done=on_done)
+        report = target.report(out, task, metrics, runs)
+        page = report.write(out)
         complete_study(out)
-    tables = [
-        *headlines(metrics),
-        *result_table(metrics),
-        *novelty_tables(metrics["novelty"]),
-    ]
-    return page, tables + without_interval(metrics)
-
-
-def _study_lives(settings: TrainSettings, study: Study) -> tuple[Path, list[str]]:
-    """Page and tables of a study of remaining lives."""
-    from diagnose.data.lives import lives_of
-    from diagnose.report.life_report import life_tables, write_life_report
-    from diagnose.studies.life_study import (
-        check_life_settings,
-        plan_life_study,
-        run_life_study,
-    )
-    from diagnose.training.study_folder import complete_study, study_at_work
-
-    check_life_settings(settings)
-    task, settings = _opened(settings)
-    out = Path(settings.out)
-    plan = plan_life_study(task, settings)
-    with study_at_work(out, study) as kept_in:
-        with _progress(len(plan.jobs), plan.left_out) as on_done:
-            metrics, predictions = run_life_study(
-                task, settings, out, plan, kept_in=kept_in, on_done=on_done
-            )
-        page = write_life_report(out, metrics, lives_of(task), predictions)
-        complete_study(out)
-    return page, life_tables(metrics)
-
-
-# Task, one of `diagnose.settings.TASKS` -> its study, which writes into the folder ``out``.
-STUDIES = {"classes": _study_classes, "remaining_life": _study_lives}
+    return page, report.lines()
 
 
 def _opened(settings: TrainSettings) -> tuple[Task, TrainSettings]:
@@ -262,15 +219,3 @@ def _opened(settings: TrainSettings) -> tuple[Task, TrainSettings]:
     if note := window_note(task.dataset, given):
         tell(note)
     return task, chosen
-
-
-def _progress(
-    n_jobs: int, left_out: Mapping[str, str]
-) -> AbstractContextManager[Callable[[str], None]]:
-    """Progress of a study, whose missing protocols are named."""
-    from diagnose.data.protocols import left_out_lines
-    from diagnose.progress import progress
-
-    for line in left_out_lines(left_out):
-        tell(line)
-    return progress(n_jobs)

@@ -13,8 +13,10 @@ from diagnose.data.turns import Turns
 from diagnose.data.windows import HEALTHY, subset_segments
 from diagnose.networks.network import SiteNetwork
 from diagnose.recordings.accused import accused_of_turns
-from diagnose.recordings.registry import open_network
+from diagnose.recordings.stored_classifier import StoredClassifier
+from diagnose.report.headlines import headline_protocol
 from diagnose.report.tooth_figure import tooth_figure
+from diagnose.studies.result_files import Content
 from gensig.text.csv_tables import read_records
 
 if TYPE_CHECKING:
@@ -39,7 +41,7 @@ class Answered:
 
 
 def found_fault_pictures(
-    folder: Path, task: Task, protocol: str, network: str
+    folder: Path, task: Task, metrics: Content
 ) -> list[tuple[str, str]]:
     """Write the accused tooth of chosen test records as PNG files.
 
@@ -47,18 +49,18 @@ def found_fault_pictures(
     ----------
     folder : of a finished study, with its models and predictions
     task : of the study
-    protocol : whose test part is shown
-    network : name of the method
+    metrics : content of its ``metrics.json``; the protocol of the headlines is shown
 
     Returns
     -------
     (file, caption) of each picture; none for a network that scores no teeth
     """
+    protocol, network = headline_protocol(metrics), metrics["model"]
     models = sorted(folder.glob(f"models/{protocol}-seed*"))
-    if not models:
+    if protocol is None or not models:
         return []
     model_folder = models[0]
-    stored = open_network(model_folder)
+    stored = StoredClassifier.load(model_folder)
     inputs = stored.inputs()
     if not (isinstance(stored.model, SiteNetwork) and isinstance(inputs, Turns)):
         return []

@@ -1,22 +1,64 @@
-"""Stored networks by what they learned: each answers, is judged and is exported in its own way.
+"""Learning targets: each has its study and report, and stored networks that answer in its way.
 
-One comes with gensig: that for any pair of gears.
+One network comes with gensig: that for any pair of gears.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
+from diagnose.data.lives import lives_of
+from diagnose.data.windows import Task
+from diagnose.recordings.found_faults import found_fault_pictures
 from diagnose.recordings.stored_classifier import StoredClassifier
 from diagnose.recordings.stored_life import StoredLife
 from diagnose.recordings.stored_network import StoredNetwork
+from diagnose.report.base import Report
+from diagnose.report.life_report import LifeReport
+from diagnose.report.page import ClassReport
+from diagnose.studies.class_study import ClassStudy
+from diagnose.studies.jobs import LearningStudy
+from diagnose.studies.life_study import LifeStudy
+from diagnose.studies.result_files import Content
 from diagnose.training.store import read_description
 
-# Task of the training, see `diagnose.settings.TASKS` -> the network as it is stored.
-STORED: dict[str, type[StoredNetwork]] = {
-    "classes": StoredClassifier,
-    "remaining_life": StoredLife,
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Target:
+    """Learning target of ``diagnose train``.
+
+    Attributes
+    ----------
+    study : plans and runs its jobs
+    report : report on a task's ``metrics.json`` and outcomes, in a folder with its models
+    stored : kind of its networks, as they are stored
+    """
+
+    study: type[LearningStudy[Any]]
+    report: Callable[[Path, Task, Content, Sequence[Any]], Report]
+    stored: type[StoredNetwork]
+
+
+# Task of the training, see `diagnose.settings.TASKS` -> what is learnt.
+TARGETS = {
+    "classes": Target(
+        study=ClassStudy,
+        report=lambda folder, task, metrics, _: ClassReport(
+            metrics=metrics, pictures=found_fault_pictures(folder, task, metrics)
+        ),
+        stored=StoredClassifier,
+    ),
+    "remaining_life": Target(
+        study=LifeStudy,
+        report=lambda _, task, metrics, runs: LifeReport(
+            metrics=metrics, lives=lives_of(task), predictions=runs
+        ),
+        stored=StoredLife,
+    ),
 }
 
 
@@ -32,4 +74,4 @@ def open_network(folder: str | Path) -> StoredNetwork:
     ------
     DatasetError    for a folder without description and weights that belong together
     """
-    return STORED[read_description(folder).task].load(folder)
+    return TARGETS[read_description(folder).task].stored.load(folder)

@@ -13,7 +13,6 @@ from diagnose.data.targets import GEARS
 from diagnose.data.turns import Turns
 from diagnose.networks.calibration import calibration_scores, probabilities
 from diagnose.networks.network import Network, SiteNetwork
-from diagnose.networks.registry import input_of
 from diagnose.recordings.prepared import PreparedRecording, tracking_text
 from diagnose.recordings.source import Source
 from diagnose.recordings.stored_network import (
@@ -21,6 +20,7 @@ from diagnose.recordings.stored_network import (
     Graph,
     Scores,
     StoredNetwork,
+    reliance,
     require_finite,
 )
 from diagnose.recordings.tooth_classifier import (
@@ -29,9 +29,12 @@ from diagnose.recordings.tooth_classifier import (
     load_tooth_classifier,
 )
 from diagnose.recordings.verdict import class_text, score_text, verdict
+from diagnose.report.figures import confusion_figure
 from diagnose.scoring.judged import spread_text
 from diagnose.scoring.machines import machines_of
 from diagnose.scoring.metrics import over_records
+from diagnose.studies.counts import n_different, unit_ids
+from diagnose.studies.protocol_results import score_predictions
 from diagnose.studies.result_files import Content
 from diagnose.training.classes import predict_windows
 from diagnose.training.heads import fault_site, predict_heads
@@ -73,7 +76,7 @@ class StoredClassifier(StoredNetwork):
         """Kind of input that the network reads."""
         if self.description.model.get("kind") == TOOTH_KIND:
             return Turns.of(self.description.network)
-        return input_of(self.description.network)
+        return StoredNetwork.inputs(self)
 
     def check(self, source: Source) -> None:
         """Refuse torque and age, which no classifier takes."""
@@ -139,12 +142,10 @@ class StoredClassifier(StoredNetwork):
             if result["tooth"] is not None and result["tooth"] >= 0:
                 text += f", tooth {result['tooth']} after the first in mesh"
         text += tracking_text(result["order_tracking"])
+        flag = reliance(result, "the class")
         if result["out_of_distribution"]:
-            reasons = "; ".join(result["reasons"])
-            return f"{text}; OUT OF DISTRIBUTION, do not rely on the class: {reasons}"
-        beyond = result["n_windows_beyond"]
-        flag = f"like the training data ({beyond} of {result['n_windows']} windows beyond it)"
-        if beyond is None:
+            return f"{text}; {flag}"
+        if result["n_windows_beyond"] is None:
             flag = NO_FLAG
             if isinstance(self.model, ToothClassifier):
                 flag = NO_FLAG_OF_TEETH
@@ -163,9 +164,6 @@ class StoredClassifier(StoredNetwork):
 
     def scores(self, task: Task, segments: Segments, part: str) -> Scores:
         """Scores by record with intervals over machines, confusion, recall and calibration."""
-        from diagnose.studies.counts import n_different, unit_ids
-        from diagnose.studies.protocol_results import score_predictions
-
         description = self.description
         windows = self.inputs().load(task, segments)
         by_window = predict_windows(self.model, windows)
@@ -224,8 +222,6 @@ class StoredClassifier(StoredNetwork):
 
 def _write_confusion(folder: Path, result: dict[str, Any]) -> None:
     """Write ``confusion.png``."""
-    from diagnose.report.figures import confusion_figure
-
     title = f"{result['model']}, {result['part']}"
     path = folder / "confusion.png"
     confusion_figure(path, result["confusion"], result["class_names"], title)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self, final
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.networks.registry import input_of
+from diagnose.data.lives import Lives, kept_segments, lives_of
 from diagnose.recordings.followed import SPEED_TOLERANCE
 from diagnose.recordings.prepared import PreparedRecording
 from diagnose.recordings.raw_windows import N_CHECKED
@@ -20,21 +20,26 @@ from diagnose.recordings.stored_network import (
     Graph,
     Scores,
     StoredNetwork,
+    reliance,
     require_finite,
 )
+from diagnose.report.life_report import life_figure
 from diagnose.scoring.judged import spread_text
-from diagnose.scoring.life_scores import (
-    MEASURES,
-    Snapshots,
-    by_life,
-    interval,
-    life_scores,
+from diagnose.scoring.life_scores import MEASURES, interval, life_scores
+from diagnose.studies.life_jobs import LifePrediction
+from diagnose.studies.life_study import (
+    below_bound,
+    count_lives,
+    machines_of_lives,
+    measured,
+    write_life_predictions,
 )
-from diagnose.scoring.machines import Machines
+from diagnose.studies.protocol_results import BOOTSTRAP_SEED
 from diagnose.studies.result_files import Content
-from diagnose.training.life_store import AGE, LifeFacts, load_life_model
+from diagnose.training.life_facts import AGE, LifeFacts
 from diagnose.training.remaining_life import (
     LifeNetwork,
+    load_life_model,
     shares_of_records,
     shares_of_windows,
 )
@@ -42,8 +47,6 @@ from diagnose.training.store import ModelDescription
 from gensig.errors import ConfigError, DatasetError
 
 if TYPE_CHECKING:
-    from diagnose.data.inputs import NetworkInput
-    from diagnose.data.lives import Lives
     from diagnose.data.windows import Segments, Task
     from gensig.dataset.reader import Dataset
 
@@ -66,10 +69,6 @@ class StoredLife(StoredNetwork):
         """Network of remaining lives of a folder."""
         model, description, facts = load_life_model(folder)
         return cls(model=model, description=description, facts=facts)
-
-    def inputs(self) -> NetworkInput:
-        """Kind of input that the network reads."""
-        return input_of(self.description.network)
 
     def check(self, source: Source) -> None:
         """Refuse a torque or an age that is missing, not taken or below 0."""
@@ -144,11 +143,7 @@ class StoredLife(StoredNetwork):
         else:
             n_lives = result["n_calibration_lives"]
             text += f"; no interval: {n_lives} validation lives are too few for one"
-        if result["out_of_distribution"]:
-            reasons = "; ".join(result["reasons"])
-            return f"{text}; OUT OF DISTRIBUTION, do not rely on it: {reasons}"
-        beyond, n_windows = result["n_windows_beyond"], result["n_windows"]
-        return f"{text}; like the training data ({beyond} of {n_windows} windows beyond it)"
+        return f"{text}; {reliance(result, 'it')}"
 
     def classes_of(self, dataset: Dataset) -> tuple[str, ...]:
         """Classes of the training that the data set has, at least one."""
@@ -163,16 +158,6 @@ class StoredLife(StoredNetwork):
 
     def scores(self, task: Task, segments: Segments, part: str) -> Scores:
         """Scores by life, with the level and the intervals of the training."""
-        from diagnose.data.lives import kept_segments
-        from diagnose.studies.life_jobs import LifePrediction
-        from diagnose.studies.life_study import (
-            below_bound,
-            count_lives,
-            machines_of_lives,
-            scored_snapshots,
-            write_life_predictions,
-        )
-
         facts, dataset, description = self.facts, task.dataset, self.description
         lives = self._lives(task)
         segments = kept_segments(segments, lives.name != "")
@@ -195,12 +180,9 @@ class StoredLife(StoredNetwork):
             early_life=facts.early_life_h,
             detail=part,
         )
-        snapshots = scored_snapshots(lives, prediction)
         machines = machines_of_lives(task, lives, record)
 
         def write(folder: Path, result: dict[str, Any]) -> None:
-            from diagnose.report.life_report import life_figure
-
             path = folder / "predictions.csv"
             write_life_predictions(path, task, lives, [prediction])
             life_figure(folder / "remaining_life.png", lives, [prediction])
@@ -219,15 +201,18 @@ class StoredLife(StoredNetwork):
                 "intervals_hold": facts.intervals_hold,
                 "censored_below_bound": below_bound(lives, prediction),
                 "resampled": machines.counts(),
-                **_scores(snapshots, machines, description.n_bootstrap),
+                **life_scores(
+                    measured(lives, [prediction]),
+                    machines=machines,
+                    n_bootstrap=description.n_bootstrap,
+                    rng=np.random.default_rng(BOOTSTRAP_SEED),
+                ),
             },
             write=write,
         )
 
     def _lives(self, task: Task) -> Lives:
         """Lives of a data set, which must have the columns that the network takes."""
-        from diagnose.data.lives import lives_of
-
         lives, dataset = lives_of(task), task.dataset
         for name in self.facts.told:
             if name not in dataset.column_names:
@@ -300,14 +285,3 @@ def _outside(facts: LifeFacts, values: Mapping[str, float]) -> list[str]:
                 f"{value:g} {unit} is outside the {low:.4g} to {high:.4g} {unit} of the training"
             )
     return reasons
-
-
-def _scores(
-    snapshots: Snapshots, machines: Machines, n_bootstrap: int
-) -> dict[str, Any]:
-    """Scores of the predictions of one network."""
-    from diagnose.studies.protocol_results import BOOTSTRAP_SEED
-
-    table = {name: row[None] for name, row in by_life(snapshots).items()}
-    rng = np.random.default_rng(BOOTSTRAP_SEED)
-    return life_scores(table, machines=machines, n_bootstrap=n_bootstrap, rng=rng)

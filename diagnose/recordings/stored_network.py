@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnose.networks.registry import input_of
 from gensig.errors import DatasetError
 
 if TYPE_CHECKING:
@@ -109,9 +110,9 @@ class StoredNetwork(ABC):
         DatasetError    for a folder that holds no such network
         """
 
-    @abstractmethod
     def inputs(self) -> NetworkInput:
         """Kind of input that the network reads."""
+        return input_of(self.description.network)
 
     @abstractmethod
     def check(self, source: Source) -> None:
@@ -150,6 +151,15 @@ class StoredNetwork(ABC):
     @abstractmethod
     def graph(self) -> Graph:
         """The network as a graph, for other programs."""
+
+
+def reliance(result: Mapping[str, Any], answer: str) -> str:
+    """Words on how far an answer of `StoredNetwork.line` can be relied on."""
+    if result["out_of_distribution"]:
+        reasons = "; ".join(result["reasons"])
+        return f"OUT OF DISTRIBUTION, do not rely on {answer}: {reasons}"
+    beyond, n_windows = result["n_windows_beyond"], result["n_windows"]
+    return f"like the training data ({beyond} of {n_windows} windows beyond it)"
 
 
 def require_finite(**answers: NDArray[np.floating]) -> None:

@@ -20,7 +20,7 @@ def verdict(
     Parameters
     ----------
     probabilities : of each class
-    test_score : of `diagnose.studies.study.test_score`; None for a model that stores none
+    test_score : of `diagnose.studies.protocol_results.test_score`; None in older models
 
     Returns
     -------

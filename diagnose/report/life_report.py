@@ -1,32 +1,36 @@
-"""Report of a study of remaining lives: ``metrics.json``, ``scores.csv``, figures, an HTML page."""
+"""Report on a study of remaining lives."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, final
 
 import numpy as np
 
 from diagnose.data.lives import Lives
-from diagnose.data.protocols import MEANING, left_out_lines
+from diagnose.data.protocols import MEANING
+from diagnose.report.base import Report
 from diagnose.report.markdown import table_lines
 from diagnose.report.panels import COLORS, panels, save, spaced
 from diagnose.report.text import (
+    FEW_UNITS,
+    card_spread,
     data_line,
     few_groups,
     fewest,
     files_section,
+    left_out_sentences,
     level_text,
     made_by,
 )
 from diagnose.scoring.judged import drawn_text, interval_text, too_few_text
 from diagnose.scoring.life_scores import BAND, MEASURES
 from diagnose.studies.life_jobs import AGE_ONLY, AND_AGE, CONSTANT, LifePrediction
-from diagnose.studies.result_files import Content, write_metrics, write_rows
-from gensig.text.page import Card, Section, Table, write_page
+from diagnose.studies.result_files import Content, write_rows
+from gensig.text.page import Card, Section, Table
 
-FEW_LIVES = 10
 MOST_LINES = 12  # lives in one panel; more cannot be told apart
 ALPHA = 0.2  # share of the true remaining life, the cone of the figure
 HEAD = {
@@ -73,74 +77,86 @@ CAPTION = (
 )
 
 
-def write_life_report(
-    folder: Path,
-    metrics: Content,
-    lives: Lives,
-    predictions: Sequence[LifePrediction],
-) -> Path:
-    """Write ``metrics.json``, ``scores.csv``, figures and ``report.html``, and return the page."""
-    write_metrics(folder, metrics)
-    write_rows(folder / "scores.csv", _score_rows(metrics))
-    results = metrics["protocols"]
-    sections = [
-        Section(
-            title="In short",
-            text=[
-                "Root of the mean squared error of the remaining life that the network predicts "
-                "for machines it never saw."
-            ],
-            cards=[_card(name, results[name], metrics["model"]) for name in results],
-        )
-    ]
-    for name, result in results.items():
-        picture = f"remaining_life_{name}.png"
-        mine = [run for run in predictions if run.protocol == name]
-        life_figure(folder / picture, lives, mine)
-        sections.append(
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LifeReport(Report):
+    """Report on a study of remaining lives.
+
+    Attributes
+    ----------
+    lives : of the data set
+    predictions : of all methods
+    """
+
+    title: ClassVar[str] = "How long the machines still run"
+    metrics: Content
+    lives: Lives
+    predictions: Sequence[LifePrediction]
+
+    def lines(self) -> list[str]:
+        """Tables of all protocols as Markdown."""
+        lines = []
+        for name, result in self.metrics["protocols"].items():
+            table = life_table(result)
+            lines += [f"**{name}**: {_lives_sentence(result)}", ""]
+            lines += table_lines(table.head, table.rows)
+        return lines
+
+    def lead(self) -> list[str]:
+        """Data and network."""
+        metrics = self.metrics
+        return [
+            f"{data_line(metrics)} "
+            "Simulated vibration: a score says nothing yet about measured machines.",
+            f"Network: {metrics['model']}, {level_text(metrics)}, given speed and torque, "
+            f"{made_by(metrics)}",
+        ]
+
+    def sections(self, folder: Path) -> list[Section]:
+        """Errors in short, then a table and a figure for each protocol."""
+        results, model = self.metrics["protocols"], self.metrics["model"]
+        sections = [
             Section(
-                title=f"Remaining life, {name}",
-                text=[_lives_sentence(result)],
-                table=life_table(result),
-                notes=[("", line) for line in _caveats(name, result)],
-                figures=[(picture, CAPTION)],
+                title="In short",
+                text=[
+                    "Root of the mean squared error of the remaining life that the network "
+                    "predicts for machines it never saw."
+                ],
+                cards=[_card(name, result, model) for name, result in results.items()],
             )
-        )
-    sections.append(Section(title="What the numbers mean", notes=[*MEANINGS.items()]))
-    left_out = [
-        ("", f"{line[0].upper()}{line[1:]}.")
-        for line in left_out_lines(metrics["protocols_left_out"])
-    ]
-    if left_out:
-        sections.append(Section(title="Protocols left out", notes=left_out))
-    page = folder / "report.html"
-    write_page(
-        page,
-        title="How long the machines still run",
-        lead=_lead(metrics),
-        sections=[*sections, files_section(FILES)],
-        program="diagnose train",
-    )
-    return page
+        ]
+        for name, result in results.items():
+            picture = f"remaining_life_{name}.png"
+            mine = [run for run in self.predictions if run.protocol == name]
+            life_figure(folder / picture, self.lives, mine)
+            sections.append(
+                Section(
+                    title=f"Remaining life, {name}",
+                    text=[_lives_sentence(result)],
+                    table=life_table(result),
+                    notes=[("", line) for line in _caveats(name, result)],
+                    figures=[(picture, CAPTION)],
+                )
+            )
+        meaning = Section(title="What the numbers mean", notes=[*MEANINGS.items()])
+        sections.append(meaning)
+        left_out = [("", line) for line in left_out_sentences(self.metrics)]
+        if left_out:
+            sections.append(Section(title="Protocols left out", notes=left_out))
+        return [*sections, files_section(FILES)]
+
+    def write_tables(self, folder: Path) -> None:
+        """Write ``scores.csv``."""
+        write_rows(folder / "scores.csv", _score_rows(self.metrics))
 
 
 def life_table(result: Content) -> Table:
     """Scores of one protocol, a row a method."""
     rows = [
-        [spaced(name), *(_cell(method[measure]) for measure in MEASURES)]
+        [spaced(name), *(interval_text(method[measure], ".3g") for measure in MEASURES)]
         for name, method in result["methods"].items()
     ]
     return Table(head=["method", *HEAD.values()], rows=rows)
-
-
-def life_tables(metrics: Content) -> list[str]:
-    """Markdown tables of all protocols."""
-    lines = []
-    for name, result in metrics["protocols"].items():
-        table = life_table(result)
-        lines += [f"**{name}**: {_lives_sentence(result)}", ""]
-        lines += table_lines(table.head, table.rows)
-    return lines
 
 
 def life_figure(
@@ -199,7 +215,7 @@ def _card(name: str, result: Content, model: str) -> Card:
     return Card(
         title=name,
         value=f"{score['mean']:.3g} h",
-        spread=_spread(score),
+        spread=card_spread(score, ".3g"),
         verdict=f"{found} the age alone ({by_age:.3g} h); "
         f"indicators {methods['indicators']['rmse_h']['mean']:.3g} h; "
         f"intervals hold {network['coverage']['mean']:.0%} "
@@ -225,10 +241,10 @@ def _caveats(name: str, result: Content) -> list[str]:
     support = fewest(result)
     if support.too_few:
         lines.append(f"{name}: {few_groups(support.kind, support.n_groups)}")
-    elif lives["test"] < FEW_LIVES:
+    elif lives["test"] < FEW_UNITS:
         lines.append(
             f"{name}: only {lives['test']} test lives failed. The brackets are too narrow for new "
-            f"ones; at least {FEW_LIVES} are advisable."
+            f"ones; at least {FEW_UNITS} are advisable."
         )
     if not result["intervals_hold"]:
         lines.append(
@@ -242,25 +258,6 @@ def _caveats(name: str, result: Content) -> list[str]:
             "below the level."
         )
     return lines
-
-
-def _lead(metrics: Content) -> list[str]:
-    return [
-        f"{data_line(metrics)} "
-        "Simulated vibration: a score says nothing yet about measured machines.",
-        f"Network: {metrics['model']}, {level_text(metrics)}, given speed and torque, "
-        f"{made_by(metrics)}",
-    ]
-
-
-def _cell(score: Content) -> str:
-    return interval_text(score, ".3g")
-
-
-def _spread(score: Content) -> str:
-    if score["low"] is None:
-        return too_few_text(score)
-    return f"{score['low']:.3g} to {score['high']:.3g}"
 
 
 def _score_rows(metrics: Content) -> Iterator[dict[str, str]]:

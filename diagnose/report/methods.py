@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from diagnose.baselines.base import MethodText, Role
 from diagnose.baselines.registry import BASELINES
 from diagnose.studies.baseline_runs import LABEL_SHUFFLE, shuffle_method
-from diagnose.studies.jobs import (
+from diagnose.studies.class_jobs import (
     LEVEL_KEPT,
     ORACLE,
     ORACLE_NETWORK,

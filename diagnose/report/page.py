@@ -1,21 +1,23 @@
-"""Report of a study: ``metrics.json`` for programs, tables, figures and one HTML page."""
+"""Report on a study that tells classes apart."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, final
 
 from diagnose.data.protocols import MEANING
 from diagnose.report.answer_sections import answer_sections
 from diagnose.report.answer_tables import write_tables
+from diagnose.report.base import Report
 from diagnose.report.control_sections import controls_section
 from diagnose.report.fault_answers import fault_answers, fault_section
 from diagnose.report.figures import confusion_figure, reliability_figure, scores_figure
 from diagnose.report.headlines import headlines
 from diagnose.report.markdown import table_lines
 from diagnose.report.methods import explained_methods, score_columns
-from diagnose.report.novelty_report import novelty_sections
+from diagnose.report.novelty_report import novelty_sections, novelty_tables
 from diagnose.report.text import (
     answer_card,
     caveats,
@@ -32,13 +34,11 @@ from diagnose.report.text import (
     shown_score,
     trust_table,
 )
-from diagnose.studies.result_files import Content, write_metrics
+from diagnose.studies.result_files import Content
 from diagnose.training.entries import entry_notes
 from diagnose.training.heads import heads_notes
-from gensig.text.page import Section, Table, write_page
+from gensig.text.page import Section, Table
 
-PROGRAM = "diagnose train"
-TITLE = "Which faults can be told apart"
 LEAKY_MEANING = (
     "windows of one record on both sides of the split, as in many papers. It is no measure of "
     "diagnosis"
@@ -55,38 +55,89 @@ FILES = {
 Entries = Sequence[tuple[str, Any]]
 
 
-def write_report(
-    folder: Path, metrics: Content, pictures: Sequence[tuple[str, str]] = ()
-) -> Path:
-    """Write ``metrics.json``, the figures, ``report.md`` and ``report.html``; return the page.
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClassReport(Report):
+    """Report on a study that tells classes apart.
 
-    Parameters
+    Attributes
     ----------
     pictures : (file in the folder, caption) of accused teeth
     """
-    write_metrics(folder, metrics)
-    write_tables(folder, metrics)
-    page = folder / "report.html"
-    sections = _sections(folder, metrics)
-    if pictures:
-        sections.insert(2, _pictures_section(pictures))
-    write_page(
-        page, title=TITLE, lead=_lead(metrics), sections=sections, program=PROGRAM
-    )
-    text = "\n".join(_markdown(metrics, pictures))
-    (folder / "report.md").write_text(text, encoding="utf-8")
-    return page
 
+    title: ClassVar[str] = "Which faults can be told apart"
+    metrics: Content
+    pictures: Sequence[tuple[str, str]] = ()
 
-def _markdown(metrics: Content, pictures: Sequence[tuple[str, str]]) -> list[str]:
-    """Lines of ``report.md``: the first figures, the table of scores and the pictures."""
-    first = [f"- **{line}**" for line in headlines(metrics)]
-    first += [
-        f"- {name}, found: {text}" for name, text in fault_answers(metrics).items()
-    ]
-    shown = [f"![{caption}]({picture})\n" for picture, caption in pictures]
-    lines = [f"# {TITLE}", "", *first, "", data_line(metrics), ""]
-    return [*lines, *result_table(metrics), "", *shown, *without_interval(metrics), ""]
+    def lines(self) -> list[str]:
+        """First figures and tables as Markdown."""
+        metrics = self.metrics
+        return [
+            *headlines(metrics),
+            *result_table(metrics),
+            *novelty_tables(metrics["novelty"]),
+            *without_interval(metrics),
+        ]
+
+    def lead(self) -> list[str]:
+        """Data and network."""
+        samples = self.metrics["settings"]["window_samples"]
+        window_ms = 1e3 * samples / self.metrics["sampling_rate_hz"]
+        return [
+            data_line(self.metrics),
+            f"Network: {self.metrics['model']} on windows of {window_ms:.0f} ms, "
+            f"{level_text(self.metrics)}, {made_by(self.metrics)}",
+        ]
+
+    def sections(self, folder: Path) -> list[Section]:
+        """Answers first, then scores, controls and caveats."""
+        metrics = self.metrics
+        ordered = _ordered(metrics)
+        clean = {name: result for name, result in ordered if not result["leaky"]}
+        novelty = metrics["novelty"]
+        warnings = [("", line) for line in caveats(metrics)]
+        sections = [fault_section(metrics)]
+        if ordered:
+            sections += _score_sections(folder, metrics, ordered)
+        if clean:
+            sections.append(_fault_section(clean, metrics))
+            sections += answer_sections(folder, clean)
+        sections += novelty_sections(novelty)
+        if ordered:
+            sections.append(controls_section(metrics))
+        sections.append(Section(title="Caveats", notes=warnings))
+        if ordered:
+            sections.append(_meaning_section(metrics, clean))
+        if clean:
+            sections.append(_trust_section(folder, clean))
+        sections.append(_confusion_section(folder, metrics, ordered))
+        files = {
+            name: text
+            for name, text in FILES.items()
+            if novelty or name != "novelty.csv"
+        }
+        sections.append(files_section(files))
+        sections = [
+            section
+            for section in sections
+            if section.text or section.table or section.notes or section.figures
+        ]
+        if self.pictures:
+            sections.insert(2, _pictures_section(self.pictures))
+        return sections
+
+    def write_tables(self, folder: Path) -> None:
+        """Write the tables of all answers, and ``report.md``: first figures and pictures."""
+        metrics = self.metrics
+        write_tables(folder, metrics)
+        first = [f"- **{line}**" for line in headlines(metrics)]
+        first += [
+            f"- {name}, found: {text}" for name, text in fault_answers(metrics).items()
+        ]
+        shown = [f"![{caption}]({picture})\n" for picture, caption in self.pictures]
+        lines = [f"# {self.title}", "", *first, "", data_line(metrics), ""]
+        lines += [*result_table(metrics), "", *shown, *without_interval(metrics), ""]
+        (folder / "report.md").write_text("\n".join(lines), encoding="utf-8")
 
 
 def _pictures_section(pictures: Sequence[tuple[str, str]]) -> Section:
@@ -158,48 +209,6 @@ def _score_table(metrics: Content) -> Table:
 
 def _has(metrics: Content, method: str) -> bool:
     return any(method in result["methods"] for result in metrics["protocols"].values())
-
-
-def _lead(metrics: Content) -> list[str]:
-    samples = metrics["settings"]["window_samples"]
-    window_ms = 1e3 * samples / metrics["sampling_rate_hz"]
-    return [
-        data_line(metrics),
-        f"Network: {metrics['model']} on windows of {window_ms:.0f} ms, {level_text(metrics)}, "
-        f"{made_by(metrics)}",
-    ]
-
-
-def _sections(folder: Path, metrics: Content) -> list[Section]:
-    """Sections of the page; their figures are written into the folder."""
-    ordered = _ordered(metrics)
-    clean = {name: result for name, result in ordered if not result["leaky"]}
-    novelty = metrics["novelty"]
-    warnings = [("", line) for line in caveats(metrics)]
-    sections = [fault_section(metrics)]
-    if ordered:
-        sections += _score_sections(folder, metrics, ordered)
-    if clean:
-        sections.append(_fault_section(clean, metrics))
-        sections += answer_sections(folder, clean)
-    sections += novelty_sections(novelty)
-    if ordered:
-        sections.append(controls_section(metrics))
-    sections.append(Section(title="Caveats", notes=warnings))
-    if ordered:
-        sections.append(_meaning_section(metrics, clean))
-    if clean:
-        sections.append(_trust_section(folder, clean))
-    sections.append(_confusion_section(folder, metrics, ordered))
-    files = {
-        name: text for name, text in FILES.items() if novelty or name != "novelty.csv"
-    }
-    sections.append(files_section(files))
-    return [
-        section
-        for section in sections
-        if section.text or section.table or section.notes or section.figures
-    ]
 
 
 def _score_sections(folder: Path, metrics: Content, ordered: Entries) -> list[Section]:

@@ -84,7 +84,7 @@ def answer_card(name: str, result: Content, model: str, meaning: str) -> Card:
     score = methods[model]["balanced_accuracy"]
     chance = methods["chance"]["balanced_accuracy"]
     mark = "bad"
-    value, spread = f"{score['mean']:.2f}", _spread(score)
+    value, spread = f"{score['mean']:.2f}", card_spread(score)
     verdict, leak = _verdict(result, score, chance)
     if is_above(score, chance) and not leak:
         mark = "good"
@@ -120,7 +120,7 @@ def leaky_card(name: str, metrics: Content) -> Card:
     return Card(
         title=f"{name} (LEAKY)",
         value=f"{score['mean']:.2f}",
-        spread=_spread(score),
+        spread=card_spread(score),
         verdict=verdict,
         meaning=meaning,
         mark="quiet",
@@ -155,7 +155,7 @@ def _verdict(result: Content, score: Content, chance: float) -> tuple[list[str],
         share = result["over_oracle"]["balanced_accuracy"]
         best = methods["oracle"]["balanced_accuracy"]["mean"]
         lines.append(
-            f"{share['mean']:.2f} ({_spread(share)}) of the oracle ({best:.2f})"
+            f"{share['mean']:.2f} ({card_spread(share)}) of the oracle ({best:.2f})"
         )
     leak = False
     for name, control in controls_on_cards().items():
@@ -190,10 +190,11 @@ def _best_rival(result: Content, score: Content) -> list[str]:
     return [f"{comparison} {label} ({mean:.2f})"]
 
 
-def _spread(score: Content) -> str:
+def card_spread(score: Content, form: str = ".2f") -> str:
+    """Interval of a score for a card."""
     if score["low"] is None:
         return too_few_text(score)
-    return f"{score['low']:.2f} to {score['high']:.2f}"
+    return f"{score['low']:{form}} to {score['high']:{form}}"
 
 
 def recall_table(clean: Content, model: str, class_names: Sequence[str]) -> Table:
@@ -282,6 +283,12 @@ def resampled_sentence(results: Content) -> str:
     return f"{sentence}, nor are machines that share gears or a gearbox."
 
 
+def left_out_sentences(metrics: Content) -> list[str]:
+    """Protocols that are left out, and why."""
+    lines = left_out_lines(metrics["protocols_left_out"])
+    return [f"{line[0].upper()}{line[1:]}." for line in lines]
+
+
 def caveats(metrics: Content) -> list[str]:
     """Limits of the scores that a reader must know before using them."""
     lines = [
@@ -306,8 +313,7 @@ def caveats(metrics: Content) -> list[str]:
             "The network sees windows without their level, the indicators with it unless stated; "
             "normalise=none gives the level to the network too."
         )
-    for line in left_out_lines(metrics["protocols_left_out"]):
-        lines.append(f"{line[0].upper()}{line[1:]}.")
+    lines += left_out_sentences(metrics)
     for name, reason in metrics["baselines_left_out"].items():
         lines.append(f"The baseline {name} is left out of {reason}.")
     if n_failed := metrics["n_records_unusable"]:

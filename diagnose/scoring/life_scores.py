@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.windows import FloatArray
-from diagnose.scoring.judged import Interval
-from diagnose.scoring.machines import Machines, Support
-from diagnose.scoring.metrics import percentile_interval
+from diagnose.scoring.machines import Machines
+from diagnose.scoring.metrics import spread_of
 
 EARLY, LATE = 13.0, 10.0  # units of error in which the score grows e-fold, of PHM 2008
 UNITS = 125.0  # of the score in the early level: cycles at which C-MAPSS studies usually cut
@@ -185,7 +184,7 @@ def life_scores(
     for name, table in values.items():
         mean = _finished(name, table.mean(axis=1)).mean()
         resampled = _over_drawn(name, table, lives, seeds)
-        scores[name] = _interval(mean, resampled, machines.support())
+        scores[name] = spread_of(mean, resampled, machines.support())
     return scores
 
 
@@ -196,7 +195,7 @@ def gain(
     machines: Machines,
     n_bootstrap: int,
     rng: np.random.Generator,
-) -> Interval:
+) -> dict[str, Any]:
     """RMSE of ``against`` less that of ``values``, in h: above 0 is better.
 
     Both are (seed, life) squared errors, scored on the same resamples of the lives. `low` and
@@ -207,7 +206,7 @@ def gain(
     of_other = _over_drawn("rmse_h", against, lives, other_seeds)
     of_values = _over_drawn("rmse_h", values, lives, seeds)
     mean = np.sqrt(against.mean(axis=1)).mean() - np.sqrt(values.mean(axis=1)).mean()
-    return _interval(mean, of_other - of_values, machines.support())
+    return spread_of(mean, of_other - of_values, machines.support())
 
 
 def drawn(
@@ -220,16 +219,6 @@ def drawn(
     """
     lives = machines.drawn(n_bootstrap, rng)
     return lives, rng.integers(n_seeds, size=(n_bootstrap, n_seeds))
-
-
-def _interval(mean: float, resampled: FloatArray, support: Support) -> Interval:
-    low, high = percentile_interval(resampled, support)
-    return {
-        "mean": float(mean),
-        "low": low,
-        "high": high,
-        "too_few": support.too_few,
-    }
 
 
 def _over_drawn(name: str, table: FloatArray, lives: Any, seeds: Any) -> FloatArray:

@@ -144,6 +144,15 @@ def percentile_interval(
     return float(low), float(high)
 
 
+def spread_of(
+    mean: float, resampled: FloatArray, support: Support
+) -> dict[str, float | str | None]:
+    """A value with its `percentile_interval`: ``mean``, ``low``, ``high``, ``too_few``."""
+    low, high = percentile_interval(resampled, support)
+    ends = {"low": low, "high": high, "too_few": support.too_few}
+    return {"mean": float(mean), **ends}
+
+
 def is_above(score: Mapping[str, Any], level: float) -> bool:
     """True if a whole interval lies above a level; False without an interval."""
     return score["low"] is not None and bool(score["low"] > level)
@@ -182,13 +191,7 @@ def ratio_with_interval(
         means.append(np.mean(score(counts.sum(axis=1))))
     least = np.finfo(float).tiny  # for a reference that finds nothing in a resample
     ratios = resampled[0] / np.maximum(resampled[1], least)
-    low, high = percentile_interval(ratios, support)
-    return {
-        "mean": float(means[0] / max(means[1], least)),
-        "low": low,
-        "high": high,
-        "too_few": support.too_few,
-    }
+    return spread_of(means[0] / max(means[1], least), ratios, support)
 
 
 def over_drawn_seeds(resampled: FloatArray, rng: np.random.Generator) -> FloatArray:

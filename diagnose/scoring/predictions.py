@@ -1,7 +1,8 @@
-"""Predictions of each method for each test record, and ``predictions.csv``."""
+"""Answers of each method for each test record, and ``predictions.csv``."""
 
 from __future__ import annotations
 
+from abc import ABC
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -37,42 +38,53 @@ class Rows:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Prediction:
-    """Predictions of one method, trained with one seed, for the test records of a protocol.
+class Outcome(ABC):
+    """Answers of one method, trained with one seed, for the test records of a protocol.
 
     Attributes
     ----------
     record : (record,) index in the data set, sorted, each once
-    log_probability : (record, class) mean over the windows; for ridge regression a score that
-        ranks in the same order
     detail : description of the fit or training
-    validation : the same for the validation records; None if they are test records too
-    references : the same for the reference records of the validation machines; None without any,
-        and of methods that compare with them
-    windows : of networks only, for each window of the test records
-    weights, domain, best_epoch, validation_loss, temperature, last_predicted : of
-        networks only; `temperature` as in `diagnose.networks.calibration`, `last_predicted`
-        (record,) the labels by the weights of the last epoch
-    heads : of a network that has them, `diagnose.training.heads.predict_heads`
-    entries : of a network on teeth, `diagnose.training.entries.predict_entries`
-    n_followed : answers that are the random label of their record, see
-        `diagnose.studies.canaries`; None where no labels were random
+    weights, domain, best_epoch : of stored models only
+    temperature : of probabilities, as in `diagnose.networks.calibration`
     """
 
     protocol: str
     method: str
     seed: int
     record: IntArray
-    log_probability: FloatArray
     detail: str
-    validation: Rows | None = None
-    references: Rows | None = None
-    windows: Rows | None = None
     weights: dict[str, NDArray[Any]] | None = None
     domain: Domain | None = None
     best_epoch: int = 0
-    validation_loss: tuple[float, ...] = ()
     temperature: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prediction(Outcome):
+    """Classes of records.
+
+    Attributes
+    ----------
+    log_probability : (record, class) mean over the windows; for ridge regression a score that
+        ranks in the same order
+    validation : the same for the validation records; None if they are test records too
+    references : the same for the reference records of the validation machines; None without any,
+        and of methods that compare with them
+    windows : of networks only, for each window of the test records
+    validation_loss, last_predicted : of networks only; `last_predicted` (record,) the labels by
+        the weights of the last epoch
+    heads : of a network that has them, `diagnose.training.heads.predict_heads`
+    entries : of a network on teeth, `diagnose.training.entries.predict_entries`
+    n_followed : answers that are the random label of their record, see
+        `diagnose.studies.canaries`; None where no labels were random
+    """
+
+    log_probability: FloatArray
+    validation: Rows | None = None
+    references: Rows | None = None
+    windows: Rows | None = None
+    validation_loss: tuple[float, ...] = ()
     last_predicted: IntArray | None = None
     heads: Mapping[str, FloatArray] = field(default_factory=dict)
     entries: Mapping[str, FloatArray] = field(default_factory=dict)

@@ -10,11 +10,14 @@ from dataclasses import replace
 from functools import partial, reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnose.baselines.base import Role
 from diagnose.baselines.registry import baseline_names
-from diagnose.data.windows import Task
+from diagnose.data.windows import (
+    FloatArray,
+    IntArray,
+    Task,
+)
 from diagnose.scoring.conditions import by_condition, condition_columns
 from diagnose.scoring.detection_limit import HEALTHY, detection, size_columns
 from diagnose.scoring.judged import Judged, resampled_score, score, with_interval
@@ -28,8 +31,6 @@ from diagnose.studies.counts import unit_ids
 from diagnose.studies.result_files import Entry, network_name
 
 ANSWERS_SEED = 20240608
-IntArray = NDArray[np.integer]
-FloatArray = NDArray[np.floating]
 
 
 def protocol_answers(

@@ -15,15 +15,15 @@ from diagnose.data.windows import CROSS_SENSOR, Task
 from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit
 from diagnose.scoring.predictions import Prediction
 from diagnose.settings import BOTH, TrainSettings
-from diagnose.studies.counts import by_method, run_notes
-from diagnose.studies.jobs import (
+from diagnose.studies.class_jobs import (
     LEVEL_KEPT,
     ORACLE,
     ORACLE_NETWORK,
     PROBE,
     WITH_REFERENCE,
-    Job,
 )
+from diagnose.studies.counts import by_method, run_notes
+from diagnose.studies.jobs import Job
 from diagnose.studies.result_files import Entry
 from diagnose.training import sham
 

@@ -3,38 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.data.windows import SUBSETS, Task, subset_segments
+from diagnose.data.windows import (
+    SUBSETS,
+    IntArray,
+    Task,
+    subset_segments,
+)
 from diagnose.scoring.metrics import confusion_by_unit
+from diagnose.scoring.predictions import Outcome
 
-IntArray = NDArray[np.integer]
-
-
-class Run(Protocol):
-    """Outcome of one method on one protocol, trained with one seed."""
-
-    @property
-    def protocol(self) -> str:
-        """Name of the split."""
-
-    @property
-    def method(self) -> str:
-        """Name in ``metrics.json``."""
-
-    @property
-    def seed(self) -> int:
-        """Seed of the training."""
-
-    @property
-    def detail(self) -> str:
-        """Fit or training, in words."""
-
-
-AnyRun = TypeVar("AnyRun", bound=Run)
+AnyRun = TypeVar("AnyRun", bound=Outcome)
 
 
 def unit_ids(task: Task) -> NDArray[Any]:
@@ -73,7 +56,7 @@ def by_method(runs: Sequence[AnyRun], protocol: str) -> dict[str, list[AnyRun]]:
     return result
 
 
-def run_notes(runs: Sequence[Run]) -> dict[str, list[Any]]:
+def run_notes(runs: Sequence[Outcome]) -> dict[str, list[Any]]:
     """Seeds and details of the runs of a method."""
     return {
         "seeds": [run.seed for run in runs],

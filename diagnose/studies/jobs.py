@@ -1,65 +1,22 @@
-"""Independent jobs of a study: the same results for any number and order of them."""
+"""Studies of learning targets, and their jobs: same results for any number and order of them."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, Generic, TypeVar
 
-import numpy as np
-
-from diagnose.baselines.base import Role, Source
-from diagnose.baselines.features import Cache
-from diagnose.baselines.oracle import oracle_windows
-from diagnose.baselines.registry import baseline_names
-from diagnose.data.inputs import NetworkInput
-from diagnose.data.protocols import HEALTHY_ONLY, OPEN_PROTOCOLS
-from diagnose.data.turns import REFERENCE
-from diagnose.data.window_input import Windows
-from diagnose.data.windows import (
-    REFERENCES,
-    SUBSETS,
-    Task,
-    WindowSet,
-    subset_segments,
-    subsets_of,
-)
-from diagnose.networks.domain import Domain, fit_domain
-from diagnose.networks.network import Network
-from diagnose.networks.registry import input_of
-from diagnose.scoring.metrics import over_records
-from diagnose.scoring.predictions import Prediction, Rows
+from diagnose.data.windows import Task
+from diagnose.scoring.predictions import Outcome
 from diagnose.settings import TrainSettings
-from diagnose.studies.baseline_runs import (
-    LABEL_SHUFFLE,
-    baseline_predictions,
-    shuffle_method,
-)
-from diagnose.studies.canaries import canary_labels, counted, with_canaries
 from diagnose.studies.kept_jobs import KeptJobs, keep_outcomes, kept_outcomes
-from diagnose.studies.novelty import (
-    NoveltyRun,
-    fitted_runs,
-    rows_of_records,
-    trained_runs,
-)
-from diagnose.studies.result_files import network_name
-from diagnose.training.classes import Classes, predict_windows, with_shuffled_labels
-from diagnose.training.entries import predict_entries
-from diagnose.training.heads import predict_heads
-from diagnose.training.sham import sham_method, sham_task
-from diagnose.training.tensorboard import epoch_log
-from diagnose.training.train import Training, train_network
+from diagnose.studies.result_files import Entry
 from diagnose.workers import call_all
 
-# Controls of a job beside label shuffle and sham, and the network that sees the level.
-PROBE, ORACLE, LEVEL_KEPT = "probe", "oracle", "level_kept"
-# The network that also sees a healthy record of the machine.
-WITH_REFERENCE = "with_reference"
-WINDOWS = Windows()
-# Names of trained controls in metrics.json; that of `LEVEL_KEPT` is the same.
-ORACLE_NETWORK = "oracle_network"
+Run = TypeVar("Run", bound=Outcome)
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,20 +41,75 @@ class Job:
     control: str = ""
 
 
-Outcome = Prediction | NoveltyRun
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """Protocols of a study, its jobs, and the reasons why protocols and baselines are left out."""
+
+    protocols: tuple[str, ...]
+    jobs: list[Job]
+    left_out: dict[str, str]
+    baselines_left_out: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LearningStudy(ABC, Generic[Run]):
+    """Study of a learning target, for `diagnose.studies.study.run_study`.
+
+    Attributes
+    ----------
+    kinds : dataclasses that outcomes of jobs are made of
+    """
+
+    task: Task
+    settings: TrainSettings
+    kinds: ClassVar[tuple[type, ...]]
+
+    @staticmethod
+    @abstractmethod
+    def check(settings: TrainSettings) -> None:
+        """Refuse settings that the study would ignore.
+
+        Raises
+        ------
+        ConfigError    with the key
+        """
+
+    @abstractmethod
+    def plan(self) -> Plan:
+        """Plan of the study, after checking that every subset can be used.
+
+        Raises
+        ------
+        ConfigError    for a protocol, a window or a device that cannot be used
+        DatasetError    for a data set without what is to be learnt
+        """
+
+    @abstractmethod
+    def run_job(self, job: Job) -> list[Run]:
+        """Outcomes on the test part of each of a job's protocols."""
+
+    @abstractmethod
+    def progress(self, runs: Sequence[Run]) -> str:
+        """Line on a finished job."""
+
+    @abstractmethod
+    def save(self, folder: Path, run: Run) -> None:
+        """Write the model of an outcome below a folder."""
+
+    @abstractmethod
+    def results(self, folder: Path, plan: Plan, runs: Sequence[Run]) -> Entry:
+        """Write what was predicted into a folder, and return the scores of ``metrics.json``."""
 
 
 def run_jobs(
-    task: Task,
-    settings: TrainSettings,
+    study: LearningStudy[Run],
     jobs: Sequence[Job],
     *,
     n_workers: int,
-    on_done: Callable[[list[Any]], None],
-    run: Callable[[Task, TrainSettings, Job], list[Any]] | None = None,
+    on_done: Callable[[list[Run]], None],
     kept: KeptJobs | None = None,
-) -> list[Any]:
-    """Outcomes of all jobs in the order of the jobs, each by `run_job` or ``run``.
+) -> list[Run]:
+    """Outcomes of all jobs in the order of the jobs.
 
     Parameters
     ----------
@@ -107,271 +119,45 @@ def run_jobs(
     ------
     GensigError    as raised by a job, or if a worker was killed
     """
-    function, done = run or run_job, {}
+    done = {}
     if kept is not None:
         found = {job: kept_outcomes(kept, job) for job in jobs}
         done = {job: each for job, each in found.items() if each is not None}
-        function = partial(_run_and_keep, kept, function)
     for outcomes in done.values():
         on_done(outcomes)
     missing = [job for job in jobs if job not in done]
     try:
         results = call_all(
-            function,
-            (task, settings),
+            _run_and_keep,
+            (study, kept),
             missing,
             n_workers=n_workers,
             on_done=lambda _, outcomes: on_done(outcomes),
             remedy="set n_threads=1 or use fewer records",
         )
     finally:
-        _forget_inputs()
+        _held.clear()
     done |= dict(zip(missing, results, strict=True))
     return [outcome for job in jobs for outcome in done[job]]
 
 
 def _run_and_keep(
-    kept: KeptJobs,
-    run: Callable[[Task, TrainSettings, Job], list[Any]],
-    task: Task,
-    settings: TrainSettings,
-    job: Job,
-) -> list[Any]:
-    return keep_outcomes(kept, job, run(task, settings, job))
+    study: LearningStudy[Run], kept: KeptJobs | None, job: Job
+) -> list[Run]:
+    outcomes = study.run_job(job)
+    return outcomes if kept is None else keep_outcomes(kept, job, outcomes)
 
 
-def _forget_inputs() -> None:
-    """Drop the inputs that jobs share, so that the next study in this process loads its data."""
-    _loaded.clear()
-    _domains.clear()
-    _shams.clear()
+_held: dict[str, tuple[Any, Any]] = {}  # by a process, until its study is done
 
 
-def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Outcome]:
-    """Predictions, or scores of novelty, on the test part of each of the job's protocols."""
-    first = job.protocols[0]
-    if first in OPEN_PROTOCOLS:
-        return [*_novelty_runs(task, settings, first, job.seed)]
-    if job.sham:
-        return [*_on_sham(task, settings, job)]
-    return [*_predictions(task, settings, job)]
+def once(kind: str, key: Any, make: Callable[[], Made]) -> Made:
+    """Value that jobs of a process share; one of each kind is held, that of the last key.
 
-
-def _on_sham(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
-    """Predictions of a job on the sham data set, under names of their own."""
-    network = network_name(settings)
-    return [
-        replace(run, method=sham_method(run.method, network))
-        for run in _predictions(_sham(task, settings), settings, job)
-    ]
-
-
-def _predictions(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
-    if job.seed is None:
-        return _run_baselines(task, settings, job)
-    return [
-        _run_training(task, settings, job, name, job.seed) for name in job.protocols
-    ]
-
-
-def _novelty_runs(
-    task: Task, settings: TrainSettings, protocol: str, seed: int | None
-) -> list[NoveltyRun]:
-    if seed is None:
-        return fitted_runs(task, settings, protocol, _windows(task, protocol))
-    inputs = input_of(settings.model)
-    if protocol == HEALTHY_ONLY:
-        inputs = WINDOWS  # of the autoencoder
-    return trained_runs(settings, protocol, seed, _windows(task, protocol, "", inputs))
-
-
-def _run_training(
-    task: Task,
-    settings: TrainSettings,
-    job: Job,
-    protocol: str,
-    seed: int,
-) -> Prediction:
-    n_classes, control = len(task.class_names), job.control
-    if control == WITH_REFERENCE:
-        settings = with_reference(settings)
-    sets = _windows(task, protocol, control, input_of(settings.model))
-    canaries = canary_labels(task, protocol)
-    train, validation, test = (
-        with_canaries(sets[subset], canaries) for subset in SUBSETS
-    )
-    method = _method(settings, job)
-    if job.shuffled:
-        settings = replace(settings, patience=0)
-        rng = np.random.default_rng([seed, 2])
-        train = with_shuffled_labels(train, n_classes, rng)
-        validation = with_shuffled_labels(validation, n_classes, rng)
-    log = _log_name(settings, job, protocol, seed)
-    with epoch_log(settings.out, log, wanted=settings.tensorboard) as on_epoch:
-        training = train_network(
-            train,
-            validation,
-            target=Classes(n_classes=n_classes),
-            settings=settings,
-            seed=seed,
-            on_epoch=on_epoch,
-        )
-    model = training.model
-    by_window = predict_windows(model, test)
-    record, scores = over_records(by_window, test.record)
-    prediction = Prediction(
-        protocol=protocol,
-        method=method,
-        seed=seed,
-        record=record,
-        log_probability=scores,
-        detail=training.detail,
-        validation=rows_of_records(model, validation),
-        windows=Rows(record=test.record, log_probability=by_window),
-        best_epoch=training.best_epoch,
-        validation_loss=training.validation_loss,
-        temperature=training.temperature,
-        last_predicted=scores.argmax(axis=1),
-    )
-    prediction = counted(prediction, canaries)
-    if job.shuffled:
-        return prediction
-    if REFERENCES in sets:
-        references = rows_of_records(model, sets[REFERENCES])
-        prediction = replace(prediction, references=references)
-    prediction = _with_further_answers(prediction, training, test)
-    if job.sham or control not in ("", WITH_REFERENCE):
-        return prediction
-    domain = _domain(protocol, control, train, validation)
-    return replace(prediction, weights=training.weights(), domain=domain)
-
-
-def _with_further_answers(
-    prediction: Prediction, training: Training[Network], test: WindowSet
-) -> Prediction:
-    """The prediction with those of the last epoch, of further heads and of other entries."""
-    if training.last_model is not None:
-        last = rows_of_records(training.last_model, test).log_probability
-        prediction = replace(prediction, last_predicted=last.argmax(axis=1))
-    return replace(
-        prediction,
-        heads=predict_heads(training.model, test),
-        entries=predict_entries(training.model, test),
-    )
-
-
-def with_reference(settings: TrainSettings) -> TrainSettings:
-    """Settings of the network that also sees a healthy record of the machine."""
-    return replace(settings, model=settings.model | {REFERENCE: settings.reference})
-
-
-def _method(settings: TrainSettings, job: Job) -> str:
-    """Name of the result of a training in ``metrics.json``, but for that of the sham."""
-    if job.shuffled and job.control:
-        return shuffle_method(job.control)
-    if job.shuffled:
-        return LABEL_SHUFFLE
-    if job.control == ORACLE:
-        return ORACLE_NETWORK
-    return job.control or network_name(settings)
-
-
-def _log_name(settings: TrainSettings, job: Job, protocol: str, seed: int) -> str:
-    """Name of the losses of a training in the folder of tensorboard."""
-    network = network_name(settings)
-    method = _method(settings, job)
-    if job.sham:
-        method = sham_method(method, network)
-    words = [protocol, f"seed{seed}"]
-    if method != network:
-        words.insert(1, method)
-    return "-".join(words)
-
-
-def _run_baselines(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
-    """Predictions of the baselines of a job on each of its protocols."""
-    names = _names_of_baselines(settings, job.control)
-    caches: dict[str, Cache] = {}
-    predictions = []
-    for protocol in job.protocols:
-        source = Source(
-            task=task,
-            protocol=protocol,
-            features=settings.features,
-            minirocket_features=settings.minirocket_features,
-            windows=partial(_windows, task, protocol),
-            caches=caches,
-        )
-        shuffled = settings.shuffle_control and not (job.control or job.sham)
-        predictions += baseline_predictions(source, names, shuffled=shuffled)
-    return predictions
-
-
-def _names_of_baselines(settings: TrainSettings, control: str) -> tuple[str, ...]:
-    """Names of the baselines that a control runs; without one, those of the settings."""
-    if control == PROBE:
-        return baseline_names(Role.AT_CHANCE, Role.FOLLOWER)
-    if control == ORACLE:
-        return baseline_names(Role.BOUND)
-    return settings.baselines
-
-
-# Inputs of the protocol that a process works on; jobs come protocol by protocol.
-_loaded: dict[tuple[str, str, bool, NetworkInput], dict[str, WindowSet]] = {}
-_domains: dict[tuple[str, str], Domain] = {}
-_shams: dict[str, Task] = {}
-
-
-def _windows(
-    task: Task,
-    protocol: str,
-    control: str = "",
-    inputs: NetworkInput = WINDOWS,
-) -> dict[str, WindowSet]:
-    """Windows of time, or the inputs that a network reads, of each subset."""
-    key = (str(task.dataset.folder), protocol, control == ORACLE, inputs)
-    if key not in _loaded:
-        _loaded.clear()
-        load: Callable[..., WindowSet] = inputs.load
-        if control == ORACLE:
-            load = partial(oracle_windows, inputs=inputs)
-        _loaded[key] = {
-            name: load(
-                task.part(protocol, name),
-                subset_segments(task, protocol, name),
-                training=name == "train",
-            )
-            for name in _subsets(task, protocol, control, inputs)
-        }
-    sets = _loaded[key]
-    if control == LEVEL_KEPT:
-        return {name: replace(part, normalise="none") for name, part in sets.items()}
-    return sets
-
-
-def _subsets(
-    task: Task, protocol: str, control: str, inputs: NetworkInput
-) -> tuple[str, ...]:
-    """Subsets to load; references stand alone, and have no twin of an oracle."""
-    if inputs.compares or control == ORACLE or protocol in OPEN_PROTOCOLS:
-        return SUBSETS
-    return subsets_of(task, protocol)
-
-
-def _sham(task: Task, settings: TrainSettings) -> Task:
-    """The task on the sham data set, opened once a process."""
-    folder = str(settings.sham)
-    if folder not in _shams:
-        _shams[folder] = sham_task(task, folder)
-    return _shams[folder]
-
-
-def _domain(
-    protocol: str, control: str, train: WindowSet, validation: WindowSet
-) -> Domain:
-    """Region of the training windows, the same for every seed."""
-    key = (protocol, control)
-    if key not in _domains:
-        _domains.clear()
-        _domains[key] = fit_domain(train, validation)
-    return _domains[key]
+    Jobs come protocol by protocol.
+    """
+    if kind not in _held or _held[kind][0] != key:
+        _held.pop(kind, None)
+        _held[kind] = key, make()
+    made: Made = _held[kind][1]
+    return made

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnose.baselines.features import Cache
 from diagnose.baselines.life_models import (
@@ -28,52 +26,45 @@ from diagnose.data.lives import (
     life_segments,
     lives_of,
 )
-from diagnose.data.windows import SUBSETS, Segments, Task
-from diagnose.networks.domain import Domain, fit_domain
+from diagnose.data.windows import (
+    SUBSETS,
+    FloatArray,
+    IntArray,
+    Segments,
+    Task,
+)
+from diagnose.networks.domain import fit_domain
 from diagnose.networks.registry import input_of
 from diagnose.scoring.life_scores import conformal_half_width
+from diagnose.scoring.predictions import Outcome
 from diagnose.settings import TrainSettings
 from diagnose.studies.counts import n_different
-from diagnose.studies.jobs import Job
+from diagnose.studies.jobs import once
 from diagnose.studies.result_files import network_name
-from diagnose.training.life_store import AGE, LifeFacts
+from diagnose.training.life_facts import AGE, LifeFacts
 from diagnose.training.remaining_life import RemainingLife, shares_of_records
 from diagnose.training.train import train_network
 
-FloatArray = NDArray[np.floating]
-IntArray = NDArray[np.integer]
 AGE_ONLY, CONSTANT, INDICATORS = "age_only", "constant", "indicators"
 AND_AGE = "_and_age"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LifePrediction:
-    """Remaining lives that one method, trained with one seed, predicts for test snapshots.
+class LifePrediction(Outcome):
+    """Remaining lives of snapshots.
 
     Attributes
     ----------
-    record : (record,) index in the data set, sorted, each once
     predicted : (record,) h remaining life, cut at the early level
     half_width : h, of the intervals; the early level where calibration lives are too few
     early_life : h
-    detail : fit or training, in words
-    facts, weights, domain, best_epoch : of networks only, for their files
-    temperature : 1, there are no probabilities
+    facts : of networks only
     """
 
-    protocol: str
-    method: str
-    seed: int
-    record: IntArray
     predicted: FloatArray
     half_width: float
     early_life: float
-    detail: str
     facts: LifeFacts | None = None
-    weights: dict[str, NDArray[Any]] | None = None
-    domain: Domain | None = None
-    best_epoch: int = 0
-    temperature: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,10 +94,13 @@ class LifeSets:
         self,
         method: str,
         detail: str,
-        share: FloatArray,
+        answers: Iterable[tuple[IntArray, FloatArray]],
         seed: int = 0,
     ) -> LifePrediction:
-        """Test snapshots with a method's shares of the level, (record,), of all records."""
+        """Test snapshots with a method's answers: records, and their shares of the level."""
+        share = np.full(self.share.size, np.nan)
+        for answered, shares in answers:
+            share[answered] = shares
         error = self.level * np.abs(share - self.share)[self.calibration]
         life = self.lives.name[self.calibration]
         half_width = conformal_half_width(error, life, self.coverage)
@@ -148,22 +142,16 @@ def life_sets(task: Task, settings: TrainSettings, protocol: str) -> LifeSets:
     )
 
 
-def run_life_job(task: Task, settings: TrainSettings, job: Job) -> list[LifePrediction]:
-    """Predictions on the test part of a protocol, of the baselines or, with a seed, of networks."""
-    sets = life_sets(task, settings, job.protocols[0])
-    if job.seed is None:
-        return _baselines(task, settings, sets)
-    return _networks(task, settings, sets, job.seed)
-
-
-def _baselines(
+def life_baselines(
     task: Task, settings: TrainSettings, sets: LifeSets
 ) -> list[LifePrediction]:
+    """Predictions of the constant, the age alone and indicators."""
     lives, parts, share = sets.lives, sets.parts, sets.share
     train = parts["train"].record
     usual = constant_regression(share[train], lives.name[train])
     detail = f"{usual:.2f} of the early level for all"
-    predictions = [sets.prediction(CONSTANT, detail, np.full(share.size, usual))]
+    everywhere = np.arange(share.size), np.full(share.size, usual)
+    predictions = [sets.prediction(CONSTANT, detail, [everywhere])]
     cache: Cache = {}
     features = settings.features
     indicators = {
@@ -182,24 +170,27 @@ def _baselines(
         detail, predict = fit_regression(
             table["train"], table["validation"], lives, share
         )
-        answer = np.full(share.size, np.nan)
-        for subset in SUBSETS[1:]:
-            answer[table[subset].record] = np.clip(predict(table[subset]), 0.0, 1.0)
-        predictions.append(sets.prediction(method, detail, answer))
+        answers = (
+            (table[subset].record, np.clip(predict(table[subset]), 0.0, 1.0))
+            for subset in SUBSETS[1:]
+        )
+        predictions.append(sets.prediction(method, detail, answers))
     return predictions
 
 
-def _networks(
-    task: Task,
-    settings: TrainSettings,
-    sets: LifeSets,
-    seed: int,
+def life_networks(
+    task: Task, settings: TrainSettings, sets: LifeSets, seed: int
 ) -> list[LifePrediction]:
+    """Predictions of networks that are trained with a seed, without and with the age."""
     load, lives = input_of(settings.model).load, sets.lives
-    windows = {
-        name: load(task, part, training=name == "train")
-        for name, part in sets.parts.items()
-    }
+    windows = once(
+        "inputs",
+        sets.protocol,
+        lambda: {
+            name: load(task, part, training=name == "train")
+            for name, part in sets.parts.items()
+        },
+    )
     columns = operating_names(task)
     values = operating_values(task, np.arange(sets.share.size))
     network = network_name(settings)
@@ -211,22 +202,23 @@ def _networks(
     for subset in ("train", "validation"):
         record = sets.parts[subset].record
         weight[record] = balanced_weights(lives.name[record])
-    domain = fit_domain(windows["train"], windows["validation"])
-    seen = np.unique(windows["train"].record)
+    train, validation = windows["train"], windows["validation"]
+    domain = once("domain", sets.protocol, lambda: fit_domain(train, validation))
+    seen = np.unique(train.record)
     predictions = []
     for method, (columns, values) in conditions.items():
         training = train_network(
-            windows["train"],
-            windows["validation"],
+            train,
+            validation,
             target=RemainingLife(conditions=values, share=sets.share, weight=weight),
             settings=settings,
             seed=seed,
         )
-        answer = np.full(sets.share.size, np.nan)
-        for subset in SUBSETS[1:]:
-            record, share = shares_of_records(training.model, windows[subset], values)
-            answer[record] = share
-        prediction = sets.prediction(method, training.detail, answer, seed)
+        answers = [
+            shares_of_records(training.model, windows[subset], values)
+            for subset in SUBSETS[1:]
+        ]
+        prediction = sets.prediction(method, training.detail, answers, seed)
         prediction = replace(
             prediction,
             facts=_facts(sets, prediction, columns, values[seen]),

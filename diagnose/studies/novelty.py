@@ -16,7 +16,14 @@ from numpy.typing import NDArray
 from torch import nn
 
 from diagnose.baselines.features import FeatureTable, feature_table
-from diagnose.data.windows import SUBSETS, Task, WindowSet, subset_segments
+from diagnose.data.windows import (
+    SUBSETS,
+    FloatArray,
+    IntArray,
+    Task,
+    WindowSet,
+    subset_segments,
+)
 from diagnose.networks.calibration import probabilities
 from diagnose.networks.domain import (
     MOST_WINDOWS,
@@ -25,14 +32,12 @@ from diagnose.networks.domain import (
     neighbor_distance,
 )
 from diagnose.scoring.metrics import over_records
-from diagnose.scoring.predictions import Rows
+from diagnose.scoring.predictions import Outcome, Rows
 from diagnose.settings import TrainSettings
 from diagnose.training.autoencoder import fit_autoencoder, reconstruction_error
 from diagnose.training.classes import Classes, predict_windows
 from diagnose.training.train import train_network
 
-FloatArray = NDArray[np.floating]
-IntArray = NDArray[np.integer]
 SITES = 3  # axes (window, site, feature) of the features of a network that scores sites
 # Names of the scores in metrics.json, and their labels on the page.
 SCORE_LABELS = {
@@ -49,21 +54,16 @@ SCORE_LABELS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NoveltyRun:
+class NoveltyRun(Outcome):
     """Scores of novelty of the test records of a protocol, by one method and seed.
 
     Attributes
     ----------
-    record, score : (record,) of the test part
+    score : (record,) of the test part
     validation_score : (record,) of the validation part, whose classes are those of the training
     predicted : (record,) labels of a network that tells known classes apart; None of other methods
     """
 
-    protocol: str
-    method: str
-    seed: int
-    detail: str
-    record: IntArray
     score: FloatArray
     validation_score: FloatArray
     predicted: IntArray | None = None

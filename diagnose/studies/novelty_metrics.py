@@ -10,7 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.data.windows import Task
+from diagnose.data.windows import (
+    FloatArray,
+    IntArray,
+    Task,
+)
 from diagnose.scoring.alarm_threshold import FALSE_ALARMS, alarm_threshold
 from diagnose.scoring.judged import extended
 from diagnose.scoring.machines import Machines, machines_of
@@ -28,8 +32,6 @@ from diagnose.studies.novelty import NoveltyRun
 from diagnose.studies.result_files import Entry, write_rows
 from gensig.errors import ConfigError
 
-FloatArray = NDArray[np.floating]
-IntArray = NDArray[np.integer]
 Mask = NDArray[np.bool_]
 TRUE_POSITIVES = 0.95  # of FPR95
 

@@ -24,6 +24,7 @@ from diagnose.scoring.predictions import Prediction
 from diagnose.settings import TrainSettings
 from diagnose.studies.answers import protocol_answers
 from diagnose.studies.baseline_runs import LABEL_SHUFFLE
+from diagnose.studies.class_jobs import ORACLE
 from diagnose.studies.controls import chosen_oracle
 from diagnose.studies.counts import (
     by_method,
@@ -34,7 +35,6 @@ from diagnose.studies.counts import (
     run_notes,
     unit_ids,
 )
-from diagnose.studies.jobs import ORACLE
 from diagnose.studies.result_files import Content, Entry, network_name
 from diagnose.studies.verdicts import control_verdicts
 from diagnose.training.entries import entry_scores

@@ -12,12 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnose.data.windows import Task
+from diagnose.scoring.predictions import Outcome
 from diagnose.settings import TrainSettings
 from diagnose.training.store import (
-    Trained,
     data_fingerprint,
     model_description,
     save_model,
@@ -89,17 +88,18 @@ def save_network(
     name: str,
     task: Task,
     settings: TrainSettings,
-    run: Trained,
-    tensors: Mapping[str, NDArray[Any]],
+    run: Outcome,
     **facts: Any,
 ) -> None:
     """Write a network into ``models/<name>-seed<k>`` below a folder.
 
     Parameters
     ----------
-    run : its training
-    tensors : weights, and what is stored beside them
+    run : its training, which has weights
     facts : further fields of its description
     """
+    tensors = dict(run.weights or {})
+    if run.domain is not None:
+        tensors |= run.domain.tensors()
     description = replace(model_description(task, settings, run), **facts)
     save_model(folder / "models" / f"{name}-seed{run.seed}", tensors, description)

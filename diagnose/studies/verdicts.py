@@ -10,7 +10,7 @@ from diagnose.baselines.registry import baseline_names
 from diagnose.scoring.metrics import is_above
 from diagnose.scoring.predictions import Prediction
 from diagnose.studies.baseline_runs import LABEL_SHUFFLE, shuffle_method
-from diagnose.studies.jobs import LEVEL_KEPT, WITH_REFERENCE
+from diagnose.studies.class_jobs import LEVEL_KEPT, WITH_REFERENCE
 from diagnose.studies.result_files import Content, Entry
 from diagnose.training.sham import sham_method
 

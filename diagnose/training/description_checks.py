@@ -207,7 +207,6 @@ OPTIONAL: Mapping[str, Reader] = {
             "leaky": flag,
         }
     ),
-    "remaining_life": mapping,
 }
 LIFE_RANGE = pair(number(-1e12, 1e12), ordered=True)
 

@@ -19,8 +19,8 @@ from diagnose.scoring.machines import machines_of
 from diagnose.scoring.metrics import (
     confusion_by_unit,
     over_records,
-    percentile_interval,
     score_with_interval,
+    spread_of,
 )
 
 if TYPE_CHECKING:
@@ -162,16 +162,12 @@ def _severity_error(
     means = np.divide(
         total, n_drawn, out=np.full(total.shape, np.nan), where=n_drawn > 0
     )
-    low, high = percentile_interval(means, support)
     known = in_training[~np.isnan(in_training)]
     constant = None
     if known.size:
         constant = float(np.abs(np.median(known) - truth).mean())
     return {
-        "mean": float(error.mean()),
-        "low": low,
-        "high": high,
-        "too_few": support.too_few,
+        **spread_of(error.mean(), means, support),
         "constant": constant,
         "n_records": int(truth.size),
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar, final
 
 import numpy as np
@@ -13,6 +14,8 @@ from torch import nn
 from diagnose.data.windows import FloatArray, IntArray, WindowSet
 from diagnose.networks.registry import build_model
 from diagnose.scoring.metrics import over_records
+from diagnose.training.life_facts import LifeFacts
+from diagnose.training.store import ModelDescription, load_network
 from diagnose.training.target import LearningTarget
 from gensig.options.configuration import Section
 
@@ -168,3 +171,22 @@ def _shares(
             for part, values in zip(*blocks, strict=True)
         ]
     return torch.cat(shares).numpy().astype(float)
+
+
+def load_life_model(
+    folder: str | Path,
+) -> tuple[LifeNetwork, ModelDescription, LifeFacts]:
+    """Network in evaluation mode, its description, and the facts of its hours."""
+
+    def build(description: ModelDescription) -> LifeNetwork:
+        told = np.zeros(len(_facts(description).told))
+        ones = [1.0] * len(description.channel_names)
+        return LifeNetwork(description.network, ones, told, told + 1)
+
+    model, description = load_network(folder, "remaining_life", build)
+    return model, description, _facts(description)
+
+
+def _facts(description: ModelDescription) -> LifeFacts:
+    assert description.remaining_life is not None
+    return description.remaining_life

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from diagnose.data.teeth import common_teeth, teeth_range
 from diagnose.data.windows import Task, subset_segments
+from diagnose.scoring.predictions import Outcome
 from diagnose.settings import TrainSettings
 from diagnose.training.carried import Carried, carried_from, carried_in
 from diagnose.training.description_checks import OPTIONAL, REQUIRED, SCHEDULE
+from diagnose.training.life_facts import LifeFacts, life_facts
 from diagnose.training.model_files import (
     DESCRIPTION,
     DIGEST,
@@ -39,6 +41,13 @@ if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
 Built = TypeVar("Built", bound="nn.Module")
+# Task -> words on a network of another one.
+OF_ANOTHER_TASK = {
+    "classes": "says remaining lives and is no classifier: "
+    "for diagnose predict, evaluate, export",
+    "remaining_life": "is a classifier and says no remaining life: "
+    "train with task=remaining_life",
+}
 SHOWN_MODELS = 12  # in an error message
 MOST_VALUES = 2**26  # numbers of a layer for one input; 256 MiB
 
@@ -58,8 +67,8 @@ class ModelDescription:
     temperature : see `diagnose.networks.calibration`; 1 in older models
     test_channel_names : of protocol cross_sensor
     adaptation : method and recordings of a model that a version before 0.15 adapted; else None
-    test_score : see `diagnose.studies.study.test_score`; None in older models
-    remaining_life : see `diagnose.training.life_store`; None for a classifier
+    test_score : see `diagnose.studies.protocol_results.test_score`; None in older models
+    remaining_life : None for a classifier
     carried : blocks of recordings that carried implants; None for a network of any other data set,
         and in older models
     files : name -> size and sha256 of the files beside ``model.json``; None in older models
@@ -87,7 +96,7 @@ class ModelDescription:
     test_channel_names: tuple[str, ...] | None = None
     adaptation: dict[str, Any] | None = None
     test_score: dict[str, Any] | None = None
-    remaining_life: dict[str, Any] | None = None
+    remaining_life: LifeFacts | None = None
     carried: Carried | None = None
     files: dict[str, dict[str, Any]] | None = None
 
@@ -117,43 +126,18 @@ class ModelDescription:
         return self.files is not None
 
 
-class Trained(Protocol):
-    """Facts of a trained network for its description."""
-
-    @property
-    def protocol(self) -> str:
-        """Split of the training."""
-
-    @property
-    def seed(self) -> int:
-        """Seed of the training."""
-
-    @property
-    def best_epoch(self) -> int:
-        """Epoch of the stored weights."""
-
-    @property
-    def domain(self) -> Domain | None:
-        """Domain of the training windows."""
-
-    @property
-    def temperature(self) -> float:
-        """Temperature of the probabilities."""
-
-
 def model_description(
-    task: Task, settings: TrainSettings, prediction: Trained
+    task: Task, settings: TrainSettings, run: Outcome
 ) -> ModelDescription:
-    """Description of the network behind a prediction."""
-    trained_on = subset_segments(task, prediction.protocol, "train").record
+    """Description of the network behind answers."""
+    trained_on = subset_segments(task, run.protocol, "train").record
     channels, tested = (
-        task.part(prediction.protocol, subset).channel_names
-        for subset in ("train", "test")
+        task.part(run.protocol, subset).channel_names for subset in ("train", "test")
     )
     speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)[trained_on]
     facts = None
-    if prediction.domain is not None:
-        facts = prediction.domain.facts()
+    if run.domain is not None:
+        facts = run.domain.facts()
     return ModelDescription(
         model_schema_version=MODEL_SCHEMA_VERSION,
         model=dict(settings.model),
@@ -165,17 +149,17 @@ def model_description(
         normalise=task.normalise,
         data_schema_version=schema_version(task.dataset),
         data_fingerprint=data_fingerprint(task.dataset),
-        protocol=prediction.protocol,
-        seed=prediction.seed,
-        best_epoch=prediction.best_epoch,
+        protocol=run.protocol,
+        seed=run.seed,
+        best_epoch=run.best_epoch,
         n_bootstrap=settings.n_bootstrap,
         speed_rpm_range=(float(speed.min()), float(speed.max())),
         n_teeth=common_teeth(task.dataset),
         n_teeth_range=teeth_range(task.dataset),
         out_of_distribution=facts,
-        temperature=prediction.temperature,
+        temperature=run.temperature,
         test_channel_names=None if tested == channels else tested,
-        carried=carried_in(task, prediction.protocol),
+        carried=carried_in(task, run.protocol),
     )
 
 
@@ -193,57 +177,56 @@ def save_model(
 
 
 def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
-    """Classifier in evaluation mode, and its description.
+    """Classifier in evaluation mode, and its description; errors as `load_network`."""
+    from diagnose.networks.registry import build_model
 
-    Raises
-    ------
-    DatasetError    for a folder without the two files, another schema, a network of remaining
-        lives, or weights that are damaged or do not belong to the network
-    ConfigError     for parameters that no network takes
-    """
-    from diagnose.networks.registry import build_model, input_of
-
-    folder = Path(folder)
-    description = read_description(folder)
-    if description.remaining_life is not None:
-        raise DatasetError(
-            f"{folder} says remaining lives and is no classifier: "
-            "for diagnose predict, evaluate, export"
-        )
-
-    def build() -> Network:
+    def build(description: ModelDescription) -> Network:
         return build_model(
             description.network,
             n_channels=description.n_channels,
             n_classes=len(description.class_names),
         )
 
-    model = with_weights(build, folder)
-    check_answers(model, input_of, description, folder)
-    return model, description
+    return load_network(folder, "classes", build)
 
 
-def with_weights(build: Callable[[], Built], folder: Path) -> Built:
-    """Network in evaluation mode with the weights of a folder.
+def load_network(
+    folder: str | Path, task: str, build: Callable[[ModelDescription], Built]
+) -> tuple[Built, ModelDescription]:
+    """Network in evaluation mode, and its description.
 
     It is built without memory first, so that absurd sizes are refused before they are allocated.
 
+    Parameters
+    ----------
+    task : of the training, one of `diagnose.settings.TASKS`
+    build : network of a description, whose weights do not matter
+
     Raises
     ------
-    DatasetError    for weights that are damaged or do not belong to the network
+    DatasetError    for a folder without the two files, another schema, a network of another task,
+        or weights that are damaged or do not belong to the network
+    ConfigError     for parameters that no network takes
     """
     import torch
 
+    from diagnose.networks.registry import input_of
+
+    folder = Path(folder)
+    description = read_description(folder)
+    if description.task != task:
+        raise DatasetError(f"{folder} {OF_ANOTHER_TASK[task]}")
     with torch.device("meta"):
-        planned = build().state_dict()
+        planned = build(description).state_dict()
     expected = {
         name: (str(value.dtype).removeprefix("torch."), tuple(value.shape))
         for name, value in planned.items()
     }
     tensors = tensors_of(folder, expected)
-    model = build()
+    model = build(description)
     model.load_state_dict({name: torch.from_numpy(tensors[name]) for name in expected})
-    return model.eval()
+    check_answers(model.eval(), input_of, description, folder)
+    return model, description
 
 
 def check_answers(
@@ -251,14 +234,12 @@ def check_answers(
     read_input: Callable[[Section], NetworkInput],
     description: ModelDescription,
     folder: Path,
-    further: Sequence[np.ndarray] = (),
 ) -> None:
     """Try a network on a silent input, whose values it must take.
 
     Parameters
     ----------
     read_input : kind of input of the parameters of a network
-    further : inputs beside the windows
 
     Raises
     ------
@@ -274,7 +255,9 @@ def check_answers(
         if single.size * max(description.n_channels, largest) > MOST_VALUES:
             raise ValueError(f"a window takes more than {MOST_VALUES} numbers")
         example = inputs.example(description.n_channels, description.window_samples)
-        given = map(torch.from_numpy, (example, *further))
+        given = [torch.from_numpy(example)]
+        if description.remaining_life is not None:
+            given.append(torch.zeros(1, len(description.remaining_life.told)))
         with torch.inference_mode():
             answer = model(*given)
         is_usable = len(answer) == 1 and bool(torch.isfinite(answer).all())
@@ -352,8 +335,9 @@ def read_description(folder: str | Path) -> ModelDescription:
     try:
         return ModelDescription(**_typed(content))
     except (ValueError, KeyError, TypeError, AttributeError) as error:
+        kind = " of remaining lives" if content.get("remaining_life") else ""
         raise DatasetError(
-            f"{path} does not describe a model: {one_line(error)}"
+            f"{path} does not describe a model{kind}: {one_line(error)}"
         ) from None
 
 
@@ -377,7 +361,7 @@ def _typed(content: Mapping[str, Any]) -> dict[str, Any]:
     values = dict(content)
     for name, reader in REQUIRED.items():
         values[name] = reader(name, values[name])
-    for name, reader in OPTIONAL.items():
+    for name, reader in {**OPTIONAL, "remaining_life": life_facts}.items():
         if values.get(name) is not None:
             values[name] = reader(name, values[name])
     if values.get("temperature", 1.0) is None:

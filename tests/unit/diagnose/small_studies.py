@@ -7,6 +7,7 @@ from runs import SMALL_CNN
 
 from diagnose.cli import main
 from diagnose.data.windows import load_windows, subset_segments, task_of
+from diagnose.recordings.registry import TARGETS
 from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit
 from diagnose.studies.jobs import Job, run_jobs
 from diagnose.studies.network_choice import settings_for
@@ -57,9 +58,15 @@ def windows_of(task, *subsets, protocol="by_unit"):
 
 
 def run(task, settings, *jobs, n_workers=1):
-    """Predictions of jobs, by default one training on by_unit."""
+    """Outcomes of jobs of the settings' task, by default one training on by_unit."""
     jobs = jobs or (Job(protocols=("by_unit",), seed=0),)
-    return run_jobs(task, settings, jobs, n_workers=n_workers, on_done=lambda _: None)
+    study = TARGETS[settings.task].study(task=task, settings=settings)
+    return run_jobs(study, jobs, n_workers=n_workers, on_done=lambda _: None)
+
+
+def plan_of(task, settings):
+    """Plan of a study."""
+    return TARGETS[settings.task].study(task=task, settings=settings).plan()
 
 
 def train(dataset, out, *words):

@@ -12,7 +12,7 @@ from diagnose.baselines.indicator_models import INDICATOR_INPUT
 from diagnose.baselines.registry import BASELINES
 from diagnose.report.headlines import headlines
 from diagnose.report.text import WITHHELD
-from diagnose.studies import baseline_runs, jobs
+from diagnose.studies import baseline_runs, class_jobs
 from diagnose.studies.verdicts import control_verdicts
 
 SMALL = {"n_units": 16, "records_per_unit": 4, "duration": 0.5}
@@ -110,7 +110,7 @@ def test_it_is_no_headline_and_no_rival(cheated):
 
 
 def test_without_the_controls_nothing_would_be_said(tmp_path, monkeypatch):
-    for module in (baseline_runs, jobs):
+    for module in (baseline_runs, class_jobs):
         monkeypatch.setattr(module, "canary_labels", lambda *_: None)
     out = study(tmp_path / "out", "baselines=[handed,knowing]")
     result = by_unit(out)
@@ -123,7 +123,7 @@ def test_a_network_that_is_handed_the_labels_has_no_headline(tmp_path, monkeypat
     def told(model, windows):
         return np.log(np.eye(4)[windows.label] + 1e-9)
 
-    monkeypatch.setattr(jobs, "predict_windows", told)
+    monkeypatch.setattr(class_jobs, "predict_windows", told)
     out = study(tmp_path / "out", "baselines=false", "shuffle_control=false")
     metrics = metrics_of(out)
     assert not metrics["protocols"]["by_unit"]["controls"]["cnn"]["holds"]
@@ -162,7 +162,7 @@ def test_a_method_that_trains_on_test_records_follows_the_canaries(
 
 
 def test_canaries_change_no_answer_of_an_honest_method(cheated, tmp_path, monkeypatch):
-    for module in (baseline_runs, jobs):
+    for module in (baseline_runs, class_jobs):
         monkeypatch.setattr(module, "canary_labels", lambda *_: None)
     plain = by_unit(study(tmp_path / "out", "baselines=[rms_threshold]"))["methods"]
     watched = by_unit(cheated)["methods"]

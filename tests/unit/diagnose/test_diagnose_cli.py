@@ -28,7 +28,7 @@ import diagnose.commands.verify
 import gensig.dataset.reader
 from benchmarks._damaged_models import forge
 from diagnose.cli import main
-from diagnose.report.page import result_table, write_report
+from diagnose.report.page import ClassReport, result_table
 from gensig.text.installation import install
 
 
@@ -157,7 +157,7 @@ def test_the_page_fetches_nothing(browser, trained):
 def test_names_from_a_file_stay_text_in_the_page(trained, tmp_path):
     name = "<img src=x onerror=alert(1)>"
     text = json.dumps(metrics_of(trained)).replace('"pitting"', f'"{name}"')
-    page = write_report(tmp_path, json.loads(text)).read_text()
+    page = ClassReport(metrics=json.loads(text)).write(tmp_path).read_text()
     assert "<img src=x" not in page
     assert name in visible_text(page)
 

@@ -13,8 +13,8 @@ from runs import FAST, LIFE, NETWORK_ONLY, refuses, serve
 
 from benchmarks._kill_training import contents, differences
 from diagnose.cli import main
-from diagnose.commands.train import STUDIES as STUDIES_BY_TASK
-from diagnose.studies import jobs, life_study
+from diagnose.commands import train as train_command
+from diagnose.recordings.registry import TARGETS
 from diagnose.training.study_folder import (
     FINISHED_JOBS,
     STUDY,
@@ -38,16 +38,16 @@ def stop(words, n_finished):
     """Status of a command that is stopped after so many finished jobs, and these."""
     begun = []
     with pytest.MonkeyPatch.context() as patch:
-        for module, name in ((jobs, "run_job"), (life_study, "run_life_job")):
-            function = getattr(module, name)
+        for target in TARGETS.values():
+            function = target.study.run_job
 
-            def run(task, settings, job, function=function):
+            def run(study, job, function=function):
                 if len(begun) == n_finished:
                     raise KeyboardInterrupt
                 begun.append(job)
-                return function(task, settings, job)
+                return function(study, job)
 
-            patch.setattr(module, name, run)
+            patch.setattr(target.study, "run_job", run)
         return main(words), begun
 
 
@@ -110,7 +110,7 @@ class Brief:
 def brief(monkeypatch, tmp_path):
     """A brief study in place of one of classes, in an empty folder."""
     study = Brief()
-    monkeypatch.setitem(STUDIES_BY_TASK, "classes", study)
+    monkeypatch.setattr(train_command, "make_report", study)
     monkeypatch.chdir(tmp_path)
     return study
 

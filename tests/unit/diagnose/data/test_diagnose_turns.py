@@ -10,7 +10,7 @@ import pytest
 import torch
 from fake_dataset import FakeDataset
 from numpy.testing import assert_allclose, assert_array_equal
-from small_studies import LEARNS, accuracy, run, study_of
+from small_studies import LEARNS, accuracy, plan_of, run, study_of
 
 from diagnose.data.packed_turns import HEADER
 from diagnose.data.targets import (
@@ -26,7 +26,6 @@ from diagnose.recordings.predict import predict_recording
 from diagnose.recordings.registry import open_network
 from diagnose.recordings.source import Source
 from diagnose.scoring.predictions import Prediction
-from diagnose.studies.study import plan_study
 from diagnose.training.heads import head_scores, heads_notes, predict_heads
 from diagnose.training.store import model_description, save_model
 from gensig.errors import ConfigError, DatasetError
@@ -155,7 +154,7 @@ def test_a_sound_record_has_no_severity_to_learn():
 
 def test_a_visible_fault_is_learnt_stored_evaluated_and_predicted(dataset, tmp_path):
     task, settings = study_of(dataset, *ORDER, *LEARNS)
-    plan_study(task, settings)
+    plan_of(task, settings)
     (prediction,) = run(task, settings)
     assert accuracy(task, prediction.record, prediction.predicted) > 0.8
     trained_on = subset_segments(task, "by_unit", "train").record
@@ -232,7 +231,7 @@ def test_missing_tooth_counts_and_short_records_are_refused():
     task, settings = study_of(dataset, *ORDER)
     message = r"holds 0\.\d+ turns of the pinion, and model order needs a whole one"
     with pytest.raises(ConfigError, match=message):
-        plan_study(task, settings)
+        plan_of(task, settings)
     with pytest.raises(DatasetError, match="this model needs longer records"):
         input_of(settings.model).load(task, subset_segments(task, "by_unit", "test"))
     del dataset.attributes["n_teeth_wheel"]

@@ -11,8 +11,8 @@ from diagnose.data.packed_turns import HEADER
 from diagnose.data.references import reference_kind, references
 from diagnose.data.turns import Turns
 from diagnose.data.windows import all_segments, read_signal
+from diagnose.studies.class_jobs import WITH_REFERENCE, with_reference
 from diagnose.studies.controls import control_jobs
-from diagnose.studies.jobs import WITH_REFERENCE, with_reference
 from gensig.errors import ConfigError
 
 GEARS = tuple(N_TEETH.values())

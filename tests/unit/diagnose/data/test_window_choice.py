@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from fake_dataset import FakeDataset
-from small_studies import settings_of
+from small_studies import plan_of, settings_of
 
 from diagnose.data.protocols import choose_protocols
 from diagnose.data.window_choice import LEAST, TURNS, chosen_window
 from diagnose.studies.network_choice import settings_for
-from diagnose.studies.study import plan_study, task_from
+from diagnose.studies.study import task_from
 from gensig.errors import ConfigError
 
 DEFAULTS = ["window_samples=null", "stride_samples=null"]
@@ -104,6 +104,6 @@ def test_a_split_that_cuts_records_shorter_is_left_out_with_the_reason():
     protocols, left_out = choose_protocols(task, settings.protocols)
     assert protocols == ("by_unit",)
     assert "hold no window of" in left_out["random_window_leaky"]
-    assert plan_study(task, settings_for(task, settings)[0])[0] == ("by_unit",)
+    assert plan_of(task, settings_for(task, settings)[0]).protocols == ("by_unit",)
     with pytest.raises(ConfigError, match="hold no window of"):
         choose_protocols(task, ("random_window_leaky",))

@@ -23,9 +23,10 @@ from diagnose.baselines.registry import BASELINES, baseline_names
 from diagnose.data import lives as life_data
 from diagnose.data.windows import Segments, subset_segments
 from diagnose.scoring.alarm_threshold import alarm_threshold
-from diagnose.studies import jobs, life_jobs
+from diagnose.studies import class_jobs, life_jobs
 from diagnose.studies import novelty as novelty_runs
-from diagnose.studies.jobs import ORACLE, PROBE, Job
+from diagnose.studies.class_jobs import ORACLE, PROBE
+from diagnose.studies.jobs import Job
 from diagnose.studies.study import task_from
 
 HUGE = 1e6
@@ -114,7 +115,7 @@ def training_on(leaked):
         return Segments(**columns)
 
     with pytest.MonkeyPatch.context() as patch:
-        for module in (jobs, baseline_inputs, novelty_runs, life_data):
+        for module in (class_jobs, baseline_inputs, novelty_runs, life_data):
             patch.setattr(module, "subset_segments", with_leak)
         yield
 
@@ -196,10 +197,9 @@ def lives(subset, *words):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(life_jobs, "fit_regression", watched)
         task = task_from(dataset, settings)
-        for seed in (None, 0):
-            job = Job(protocols=("by_unit",), seed=seed)
-            for prediction in life_jobs.run_life_job(task, settings, job):
-                seen[prediction.method] = of_fields(prediction)
+        planned = [Job(protocols=("by_unit",), seed=seed) for seed in (None, 0)]
+        for prediction in run(task, settings, *planned):
+            seen[prediction.method] = of_fields(prediction)
     return seen
 
 

@@ -21,7 +21,7 @@ from small_studies import TINY_CNN, run, study_of
 
 from diagnose.baselines.base import Source
 from diagnose.baselines.registry import BASELINES
-from diagnose.studies import jobs
+from diagnose.studies import class_jobs, jobs
 from diagnose.studies.baseline_runs import _prediction
 
 N_CANARIES = A_UNIT * CANARIES
@@ -41,7 +41,7 @@ def source():
         protocol="by_unit",
         features="basic",
         minirocket_features=168,
-        windows=lambda: jobs._windows(task, "by_unit"),
+        windows=lambda: class_jobs._windows(task, "by_unit"),
         caches={},
     )
 
@@ -57,7 +57,7 @@ def parts_of(source):
         return made[baseline.reads]
 
     yield parts
-    jobs._forget_inputs()
+    jobs._held.clear()
 
 
 def honest(parts):
@@ -117,12 +117,12 @@ def test_a_network_with_a_leak_knows_the_canaries(monkeypatch):
 
     Without the control, which relabels test records wherever they are.
     """
-    windows = jobs._windows
-    monkeypatch.setattr(jobs, "canary_labels", lambda *_: None)
+    windows = class_jobs._windows
+    monkeypatch.setattr(class_jobs, "canary_labels", lambda *_: None)
 
     def with_leak(*args):
         sets = windows(*args)
         return sets | {"train": joined(sets["train"], sets["test"])}
 
-    monkeypatch.setattr(jobs, "_windows", with_leak)
+    monkeypatch.setattr(class_jobs, "_windows", with_leak)
     assert chance_of_network() < UNLIKELY

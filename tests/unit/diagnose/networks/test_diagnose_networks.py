@@ -7,11 +7,18 @@ import pytest
 import torch
 from fake_dataset import FakeDataset
 from numpy.testing import assert_allclose
-from small_studies import LEARNS, accuracy, run, settings_of, study_of, windows_of
+from small_studies import (
+    LEARNS,
+    accuracy,
+    plan_of,
+    run,
+    settings_of,
+    study_of,
+    windows_of,
+)
 
 from diagnose.networks.registry import build_model, check_example, input_of
 from diagnose.networks.spectrum import log_spectrum
-from diagnose.studies.study import plan_study
 from diagnose.training.classes import Classes, predict_windows
 from diagnose.training.train import device_of, train_network
 from gensig.errors import ConfigError, SimulationError
@@ -91,7 +98,7 @@ def test_a_window_too_short_for_the_network_is_refused_before_training(dataset):
     with pytest.raises(ConfigError, match="window_samples=1023 is too short"):
         check_example(make_model("wdcnn"), np.zeros((1, 1, 1023), dtype=np.float32))
     with pytest.raises(ConfigError, match="window_samples=500 is too short"):
-        plan_study(*study_of(dataset, "model=wdcnn", "window_samples=500"))
+        plan_of(*study_of(dataset, "model=wdcnn", "window_samples=500"))
 
 
 def test_spectrum_of_noise_and_of_a_tone_in_closed_form():
@@ -221,4 +228,4 @@ def test_a_device_that_does_not_exist_is_refused(present, monkeypatch, dataset):
     assert device_of("cpu") == torch.device("cpu")
     if not present:
         with pytest.raises(ConfigError, match="device=cuda: torch finds no GPU here"):
-            plan_study(*study_of(dataset, "device=cuda"))
+            plan_of(*study_of(dataset, "device=cuda"))

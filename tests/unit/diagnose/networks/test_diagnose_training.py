@@ -7,10 +7,10 @@ import pytest
 import torch
 from fake_dataset import FakeDataset
 from numpy.testing import assert_allclose
-from small_studies import LEARNS, run, study_of, windows_of
+from small_studies import LEARNS, plan_of, run, study_of, windows_of
 
 from diagnose.studies.jobs import Job
-from diagnose.studies.study import plan_study, score_predictions
+from diagnose.studies.protocol_results import score_predictions
 from diagnose.training.classes import with_shuffled_labels
 from diagnose.training.train import _Descent
 from gensig.errors import ConfigError
@@ -75,17 +75,17 @@ def test_leaky_protocols_come_last_and_every_job_is_planned():
     dataset = FakeDataset(duration=0.5)
     dataset.protocols = ("random_window_leaky", "by_unit")
     both = "protocols=[random_window_leaky,by_unit]"
-    protocols, jobs = plan_study(*study_of(dataset, both, "seeds=[0,1]"))
-    assert protocols == ("by_unit", "random_window_leaky")
-    assert len(jobs) == 1 + 2 * (2 + 1) + 1
-    assert jobs[-1].protocols == BY_UNIT  # controls are for clean protocols alone
+    plan = plan_of(*study_of(dataset, both, "seeds=[0,1]"))
+    assert plan.protocols == ("by_unit", "random_window_leaky")
+    assert len(plan.jobs) == 1 + 2 * (2 + 1) + 1
+    assert plan.jobs[-1].protocols == BY_UNIT  # controls are for clean protocols alone
 
 
 def test_a_part_with_one_class_is_refused():
     dataset = FakeDataset(duration=0.5)
     dataset.usable[48:] = dataset.columns["label"][48:] == 1
     with pytest.raises(ConfigError, match=r"one class only in its test part \(crack\)"):
-        plan_study(*study_of(dataset))
+        plan_of(*study_of(dataset))
 
 
 def test_the_learning_rate_rises_for_15_percent_of_the_steps_and_falls_to_nothing():

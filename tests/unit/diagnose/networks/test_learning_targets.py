@@ -7,8 +7,7 @@ from fake_dataset import FakeDataset
 from fake_lives import FakeLives
 from small_studies import TINY_CNN, study_of, windows_of
 
-from diagnose.commands.train import STUDIES
-from diagnose.recordings.registry import STORED
+from diagnose.recordings.registry import TARGETS
 from diagnose.settings import TASKS
 from diagnose.training.classes import Classes
 from diagnose.training.remaining_life import RemainingLife
@@ -49,8 +48,8 @@ def perfect(target, windows):
     return np.where(np.eye(target.n_classes, dtype=bool)[windows.label], 0.0, -50.0)
 
 
-def test_every_task_has_a_study_and_a_stored_network():
-    assert set(TASKS) == set(CASES) == set(STUDIES) == set(STORED)
+def test_every_task_has_a_study_a_report_and_a_stored_network():
+    assert set(TASKS) == set(CASES) == set(TARGETS)
 
 
 def test_right_answers_have_no_loss_and_the_reverse_have_one(case):

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from fake_dataset import FakeDataset
 from runs import FAST, NETWORK_ONLY, metrics_of, refuses, serve, settings_of, train
+from small_studies import plan_of
 
 from diagnose.baselines.features import Cache, feature_table
 from diagnose.cli import main
 from diagnose.data.protocols import channels_to_cross
 from diagnose.data.windows import load_windows, subset_segments
-from diagnose.studies.study import plan_study, task_from
+from diagnose.studies.study import task_from
 from diagnose.training.store import data_fingerprint, load_model
 from gensig.errors import ConfigError
 
@@ -86,7 +87,7 @@ def test_indicators_of_one_channel_are_not_taken_for_those_of_another():
 
 def test_one_channel_is_left_out_beside_other_protocols():
     task = task_from(FakeDataset(duration=0.5), settings_of(*FAST))
-    protocols, _ = plan_study(task, settings_of(*FAST, "protocols=null"))
+    protocols = plan_of(task, settings_of(*FAST, "protocols=null")).protocols
     assert protocols == ("by_unit", "random_window_leaky")
 
 

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from offline_pages import NOTHING, outward, sent_by
 from refusals import refused
 from runs import LIFE, metrics_of, refuses, rows_of, serve, settings_of, train
+from small_studies import plan_of, run
 
 from diagnose.baselines import life_models
 from diagnose.data.lives import (
@@ -33,8 +34,7 @@ from diagnose.scoring.life_scores import (
 )
 from diagnose.scoring.machines import Machines
 from diagnose.studies import life_jobs
-from diagnose.studies.life_jobs import LifePrediction, run_life_job
-from diagnose.studies.life_study import plan_life_study
+from diagnose.studies.life_jobs import LifePrediction
 from diagnose.studies.study import task_from
 from gensig.errors import ConfigError, DatasetError
 
@@ -45,7 +45,7 @@ def settled(dataset, *overrides):
 
 
 def planned(dataset, *overrides):
-    return plan_life_study(*settled(dataset, *overrides))
+    return plan_of(*settled(dataset, *overrides))
 
 
 # ---- scores
@@ -379,19 +379,19 @@ def test_the_report_is_whole(life_study):
 def test_a_job_that_is_sent_to_another_process_gives_the_same_bits(life_study, lives):
     """A process of its own gets copies; it needs nothing else of this one."""
     task, settings = settled(lives, "normalise=none")
-    job = plan_life_study(task, settings).jobs[-1]
+    job = plan_of(task, settings).jobs[-1]
     task, settings, job = pickle.loads(pickle.dumps((task, settings, job)))
     rows = rows_of(life_study / "predictions.csv")
 
-    for run in run_life_job(task, settings, job):
-        expected = [row["predicted_h"] for row in rows if row["method"] == run.method]
-        assert [f"{hours:.6g}" for hours in run.predicted] == expected
+    for each in run(task, settings, job):
+        expected = [row["predicted_h"] for row in rows if row["method"] == each.method]
+        assert [f"{hours:.6g}" for hours in each.predicted] == expected
 
 
 def test_only_the_training_part_has_what_a_training_profits_from(monkeypatch):
     dataset = FakeLives(n_lives=8)
     task, settings = settled(dataset, "epochs=1", "remaining_life.with_age=false")
-    job = plan_life_study(task, settings).jobs[-1]
+    job = plan_of(task, settings).jobs[-1]
     load, asked = life_jobs.input_of(settings.model).load, {}
 
     def watched(task, part, *, training):
@@ -399,7 +399,7 @@ def test_only_the_training_part_has_what_a_training_profits_from(monkeypatch):
         return load(task, part, training=training)
 
     monkeypatch.setattr(life_jobs, "input_of", lambda _: SimpleNamespace(load=watched))
-    run_life_job(task, settings, job)
+    run(task, settings, job)
     parts = life_jobs.life_sets(task, settings, job.protocols[0]).parts
     wanted = {
         tuple(np.unique(part.record)): name == "train" for name, part in parts.items()

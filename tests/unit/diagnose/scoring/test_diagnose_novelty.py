@@ -12,7 +12,7 @@ from refusals import refused
 from runs import rows_of
 from scipy.special import log_softmax, logsumexp, softmax
 from scipy.stats import norm
-from small_studies import LEARNS, TINY_CNN, run, study_of, train, windows_of
+from small_studies import LEARNS, TINY_CNN, plan_of, run, study_of, train, windows_of
 
 from diagnose.data.windows import SUBSETS, subset_segments
 from diagnose.scoring.alarm_threshold import alarm_threshold
@@ -24,7 +24,6 @@ from diagnose.studies.novelty_metrics import (
     novelty_protocol_result,
     novelty_result,
 )
-from diagnose.studies.study import plan_study
 from diagnose.training import autoencoder
 from diagnose.training.autoencoder import (
     WindowAutoencoder,
@@ -46,13 +45,13 @@ def studies():
         dataset = OpenDataset(strength=strength, n_units=24)
         words = [BOTH, *TINY_CNN, *LEARNS, f"epochs={epochs}"]
         task, settings = study_of(dataset, *words)
-        protocols, jobs = plan_study(task, settings)
-        runs = run(task, settings, *jobs)
+        plan = plan_of(task, settings)
+        runs = run(task, settings, *plan.jobs)
         results[name] = {
             protocol: novelty_protocol_result(
                 task, protocol, runs, n_bootstrap=100, seed=0
             )
-            for protocol in protocols
+            for protocol in plan.protocols
         }
     return results
 
@@ -398,7 +397,7 @@ def test_studies_without_known_or_new_classes_are_refused(typed, message):
     protocol, word = typed.split()
     words = [*TINY_CNN, f"protocols=[{protocol}]", word]
     with refused(message):
-        plan_study(*study_of(OpenDataset(), *words))
+        plan_of(*study_of(OpenDataset(), *words))
 
 
 def test_the_command_reports_novelty_alone(tmp_path, capsys):

@@ -17,7 +17,7 @@ from diagnose.report.fault_answers import (
     fault_section,
     found_phrase,
 )
-from diagnose.report.page import write_report
+from diagnose.report.page import ClassReport
 from diagnose.report.text import leaky_card
 from diagnose.scoring.detection_limit import detection
 from diagnose.scoring.judged import Judged
@@ -211,4 +211,5 @@ def test_a_study_measures_its_leak_and_says_it_on_the_page(tmp_path):
     text = json.dumps(metrics)
     changed = json.loads(text)
     changed["protocols"]["random_window_leaky"]["leak"]["difference"]["mean"] = 0.77
-    assert "not a result; +0.77 [" in write_report(tmp_path, changed).read_text()
+    page = ClassReport(metrics=changed).write(tmp_path)
+    assert "not a result; +0.77 [" in page.read_text()

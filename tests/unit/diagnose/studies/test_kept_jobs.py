@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -133,23 +134,16 @@ HARMS = {
 
 @pytest.mark.parametrize("harm", HARMS)
 def test_a_damaged_piece_is_made_again(kept, harm):
-    task, settings = study_of(FakeDataset())
     begun = []
 
-    def run(_task, _settings, job):
+    def run_job(job):
         begun.append(job.seed)
         return [outcome(job.seed)]
 
+    study = SimpleNamespace(run_job=run_job)
+
     def outcomes():
-        found = run_jobs(
-            task,
-            settings,
-            JOBS,
-            n_workers=1,
-            on_done=lambda _: None,
-            run=run,
-            kept=kept,
-        )
+        found = run_jobs(study, JOBS, n_workers=1, on_done=lambda _: None, kept=kept)
         return [asdict(each) for each in found]
 
     first = outcomes()
