@@ -27,7 +27,7 @@ def validate(arguments: Namespace) -> int:
     results = verdicts.run_validation()
     if arguments.markdown:
         _write_pages(page.markdown(results), Path(arguments.markdown).parent)
-    show(*page.shortfalls(results), page.summary(results))
+    show(*page.shortfalls(results), *page.summary(results).splitlines())
     n_surprises = sum(not result.as_expected for result in results)
     if n_surprises:
         remark(f"{n_surprises} row(s) differ from what they declare")

@@ -6,6 +6,8 @@ import csv
 import io
 import math
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -92,7 +94,15 @@ def test_the_verb_writes_these_pages(results, pages, tmp_path, monkeypatch, caps
     assert main(["validate", "--markdown", str(page)]) == 0
     written = {name: (page.parent / name).read_text("utf-8") for name in pages}
     assert written == pages
-    assert "rows" in capsys.readouterr().out
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.startswith("| spur_paper | ") for line in lines)
+
+
+def test_rows_need_nothing_but_their_folder():
+    """The command finds them as its user does, without the folders of these tests."""
+    code = "from gensig.commands.validate import _of_checkout; _of_checkout('verdicts')"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_no_other_page_is_there(pages):

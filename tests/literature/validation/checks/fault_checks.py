@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from fault_cases import side_of
 
 from gensig.faults.base import faulty_teeth
 from gensig.faults.flank_loss import pitch_abscissa, root_chord_abscissa
@@ -111,7 +110,8 @@ def _pit_abscissa(case: Case, at: str) -> float:
 def _gap_opening(case: Case, at: str) -> float:
     """Largest gap that the fault opens between its flank and the mate on the path of contact."""
     table, fault = case.table, case.faults[0]
-    gap = side_of(table, fault.gear).gap
+    side = ("pinion", "wheel").index(fault.gear)
+    gap = np.squeeze(table.parts[side].gap, axis=(1 - side, 2))
     opening = gap[case.faulty_kinds[f"{fault.gear}_kind"]] - gap[0]
     on_path = (table.position >= 0.0) & (table.position <= case.pair.path_of_contact)
     return float(opening[on_path].max())
