@@ -12,8 +12,7 @@ ROOT = Path(__file__).resolve().parents[3]
 # modules that make a page; a test of each opens its page in a browser
 MAKERS = {
     "diagnose/bridge/bridge_page.py",
-    "diagnose/report/life_report.py",
-    "diagnose/report/page.py",
+    "diagnose/report/base.py",
     "gensig/report/document.py",
 }
 TEXT = "see https://example.org <img src=https://example.org/x.png>"
