@@ -1,5 +1,6 @@
 """Shared fixtures: the paper's rig as a configuration and as a machine."""
 
+import gc
 import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping
@@ -49,6 +50,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             len(FIRST),
         )
     )
+    # what was collected lives to the end: the collector of garbage need not look at it again
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

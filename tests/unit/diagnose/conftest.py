@@ -20,3 +20,16 @@ def two_channel_model(tmp_path_factory):
     out = tmp_path_factory.mktemp("study") / "out"
     train(two_channels(), out, "epochs=5", *NETWORK_ALONE)
     return str(out / "models" / "by_unit-seed0")
+
+
+@pytest.fixture(scope="module")
+def parts_of(source):
+    """Function that returns the tables that a baseline reads, made once of a module's source."""
+    made = {}
+
+    def parts(baseline):
+        if baseline.reads not in made:
+            made[baseline.reads] = baseline.reads.make(source)
+        return made[baseline.reads]
+
+    return parts

@@ -37,19 +37,6 @@ def source():
     )
 
 
-@pytest.fixture(scope="module")
-def parts_of(source):
-    """Function that returns the tables that a baseline reads, made once."""
-    made = {}
-
-    def parts(baseline):
-        if baseline.reads not in made:
-            made[baseline.reads] = baseline.reads.make(source)
-        return made[baseline.reads]
-
-    return parts
-
-
 @pytest.mark.parametrize("features", FEATURES)
 def test_a_table_has_the_chosen_indicators_of_each_channel(source, features):
     chosen = replace(source, features=features, caches={})

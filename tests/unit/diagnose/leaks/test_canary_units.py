@@ -36,7 +36,7 @@ DRAWS = {"rms_threshold": 20}
 def source():
     """Data of the canaries and of the units before them."""
     task, _ = study_of(Canaries(), *WINDOW)
-    return Source(
+    yield Source(
         task=task,
         protocol="by_unit",
         features="basic",
@@ -44,19 +44,6 @@ def source():
         windows=lambda: class_jobs._windows(task, "by_unit"),
         caches={},
     )
-
-
-@pytest.fixture(scope="module")
-def parts_of(source):
-    """Function that returns the tables of a baseline, made once."""
-    made = {}
-
-    def parts(baseline):
-        if baseline.reads not in made:
-            made[baseline.reads] = baseline.reads.make(source)
-        return made[baseline.reads]
-
-    yield parts
     jobs._held.clear()
 
 
