@@ -84,7 +84,7 @@ def _name(row: Comparison) -> str:
 
 
 def _answers(rows: Sequence[Comparison]) -> list[str]:
-    """What of the recording is simulated too wide, and what tells a wrong simulation apart."""
+    """Quantities of the recording that are simulated too wide, and those that tell it apart."""
     named: dict[str, list[str]] = {row.at: [] for row in rows}
     for row in rows:
         if row.verdict in (MISSES, APART):
