@@ -108,7 +108,6 @@ PAGES = {
             "fluctuation_in_time.computed_pump_gear",
             "pump_drive.safety_paper",
             "root_stress_in_time.before",
-            "ratios_in_time.energy_peak_pump_gear",
         ),
         picture="engine_11.png",
         caption="Speed of the pump gear over two cycles, for two firing orders",
