@@ -11,7 +11,7 @@ from pathlib import Path
 from gensig.dataset.folder.beginning import create_folder
 from gensig.dataset.folder.closing import finalize
 from gensig.dataset.folder.failures import commonest, failure_reasons
-from gensig.dataset.folder.joining import agreed_folder, joined_folder
+from gensig.dataset.folder.joining import joined_folder
 from gensig.dataset.folder.layout import (
     SHARDS,
     ConfigContent,
@@ -20,11 +20,7 @@ from gensig.dataset.folder.layout import (
     read_manifest,
     shard_path,
 )
-from gensig.dataset.folder.manifest import (
-    identity_hash,
-    record_failed_shard,
-    record_shard,
-)
+from gensig.dataset.folder.manifest import identity_hash, record_shards
 from gensig.dataset.folder.quick_check import size_problem
 from gensig.dataset.folder.run_log import log
 from gensig.dataset.plan import Plan
@@ -34,6 +30,7 @@ from gensig.dataset.storage.compression import COMPRESSIONS, creation_options
 from gensig.dataset.storage.receipts import (
     collect_receipts,
     receipt_path,
+    shard_entries,
 )
 from gensig.errors import ConfigError
 from gensig.execution.base import Executor, ShardFailure
@@ -47,9 +44,7 @@ from gensig.production.run_check import (
     lost_shards,
     require_tables,
     require_whole,
-    shard_entries,
 )
-from gensig.production.shard_writing import WrittenShard
 from gensig.record.inputs import InputReader
 from gensig.terminal.run_progress import Progress
 from gensig.version import __version__
@@ -93,12 +88,12 @@ class _Tally:
     n_made: int = 0
     n_bytes: int = 0
 
-    def add(self, n_records: int, shard: WrittenShard) -> None:
+    def add(self, shard: ShardEntry) -> None:
         """Count a shard that was made."""
-        self.n_done += n_records
-        self.n_made += n_records
+        self.n_done += shard.rows
+        self.n_made += shard.rows
         self.n_failed += shard.n_failed
-        self.n_bytes += shard.n_bytes
+        self.n_bytes += shard.bytes
 
     def progress(self, reason: str = "") -> Progress:
         """The state after a shard; ``reason`` says why it could not be made."""
@@ -141,15 +136,17 @@ def _join(
     out: Path, asked: ConfigContent | None, maker: Maker, *, closes: bool
 ) -> None:
     """Refuse a folder of another version or configuration; restore lost tables of one to close."""
-    if closes:
-        manifest, config = agreed_folder(out, asked=asked)
+    if not closes:
+        joined_folder(out, asked=asked)
+        return
+
+    def restore(manifest: Manifest, config: ConfigContent) -> None:
         restore_tables(out, manifest, lambda: maker.plan(out, config))
-    joined_folder(out, asked=asked)
-    if closes:
-        collect_receipts(out)
-        manifest = read_manifest(out)
-        if not manifest.is_complete:
-            require_tables(out, manifest)
+
+    manifest, _ = joined_folder(out, asked=asked, restore=restore)
+    collect_receipts(out)
+    if not manifest.is_complete:
+        require_tables(out, manifest)
 
 
 def _run_shards(
@@ -163,7 +160,7 @@ def _run_shards(
     manifest = read_manifest(out)
     rows = [entry.rows for entry in manifest.shards]
     mine = executor.share(range(len(rows)))
-    entries = shard_entries(out, mine)
+    entries = shard_entries(out, manifest, mine)
     missing = [index for index in mine if not _is_there(out, index, entries[index])]
     if missing:
         maker.check(out)
@@ -189,9 +186,9 @@ def _run_shards(
             reason = _recorded(out, index, result, manifest, closes=executor.closes)
             if reason:
                 problems.append(reason)
-            elif isinstance(result, WrittenShard):
+            elif isinstance(result, ShardEntry):
                 made[index] = result.sha256
-                tally.add(rows[index], result)
+                tally.add(result)
             on_shard(tally.progress(reason))
         if not problems:
             problems = lost_shards(out, mine, made)
@@ -207,7 +204,7 @@ def _run_shards(
 def _recorded(
     out: Path,
     index: int,
-    result: WrittenShard | ShardFailure,
+    result: ShardEntry | ShardFailure,
     manifest: Manifest,
     *,
     closes: bool,
@@ -222,19 +219,19 @@ def _recorded(
     if isinstance(result, ShardFailure):
         reason = f"shard {index}: {result.reason}"
         if closes:
-            record_failed_shard(out, index)
+            record_shards(out, {index: manifest.shards[index].failed()})
             log(out, f"{reason}; not made")
         return reason
     if closes:
-        record_shard(out, index, result.sha256, result.n_bytes, result.n_failed)
+        record_shards(out, {index: result})
         receipt_path(out, index).unlink(missing_ok=True)
-        sizes = f"{result.n_failed} failed, {result.n_bytes} bytes"
-        log(out, f"shard {index}: {manifest.shards[index].rows} records, {sizes}")
+        sizes = f"{result.n_failed} failed, {result.bytes} bytes"
+        log(out, f"shard {index}: {result.rows} records, {sizes}")
     return ""
 
 
 def _again(
-    out: Path, index: int, result: WrittenShard | ShardFailure, entry: ShardEntry
+    out: Path, index: int, result: ShardEntry | ShardFailure, entry: ShardEntry
 ) -> str:
     """The reason why a lost shard of a closed folder is not as it was, or ''."""
     receipt_path(out, index).unlink(missing_ok=True)

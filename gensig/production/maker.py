@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from gensig.dataset.folder.layout import ConfigContent
+from gensig.dataset.folder.layout import ConfigContent, ShardEntry
 from gensig.dataset.plan import Plan
 from gensig.options.configuration import Configuration
 from gensig.plan.make import make_plan
-from gensig.production.shard_writing import WrittenShard, write_shard
+from gensig.production.shard_writing import write_shard
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,7 +26,7 @@ class Maker:
 
     plan: Callable[[Path, ConfigContent], Plan]
     check: Callable[[Path], None]
-    write: Callable[..., WrittenShard]
+    write: Callable[..., ShardEntry]
 
 
 def _plan(_out: Path, config: ConfigContent) -> Plan:

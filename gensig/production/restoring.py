@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from gensig.dataset.folder.layout import (
 )
 from gensig.dataset.plan import Plan, plan_text, read_plan
 from gensig.dataset.splitting.protocols import make_splits
-from gensig.dataset.storage.atomic import write_text
+from gensig.dataset.storage.atomic import sha256_text, write_text
 from gensig.dataset.storage.index import write_index
 from gensig.errors import DatasetError
 
@@ -58,7 +57,7 @@ def restore_tables(
 
 def _restore(out: Path, manifest: Manifest, name: str, make: Callable[[], str]) -> None:
     text = make()
-    if hashlib.sha256(text.encode("utf-8")).hexdigest() != manifest.files[name]:
+    if sha256_text(text) != manifest.files[name]:
         raise _other_bits(out / name)
     write_text(out / name, text)
 

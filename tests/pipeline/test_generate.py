@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 import gensig
 import gensig.errors
 from gensig.cli import main
-from gensig.dataset.folder.manifest import read_manifest
+from gensig.dataset.folder.layout import read_manifest
 from gensig.dataset.folder.verify import verify
 from gensig.production import making
 

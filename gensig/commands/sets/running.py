@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from gensig.commands.console import remark
 from gensig.dataset.folder.failures import commonest, failure_reasons
-from gensig.dataset.folder.manifest import read_manifest
+from gensig.dataset.folder.layout import read_manifest
 from gensig.errors import Interrupted
 from gensig.terminal.printing import show
 from gensig.terminal.run_progress import RunProgress

@@ -1,6 +1,5 @@
 """Creation of a data-set folder: plan, splits and, last, the manifest."""
 
-import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -31,6 +30,7 @@ from gensig.dataset.storage.atomic import (
     at_work,
     cannot_write,
     locked,
+    sha256_text,
     write_text,
 )
 from gensig.dataset.storage.made_together import made_together, remove
@@ -93,7 +93,7 @@ def create_folder(
             ShardEntry(name=shard_name(i), rows=rows)
             for i, rows in enumerate(plan.shard_sizes())
         ),
-        files={name: _digest(text) for name, text in texts.items()},
+        files={name: sha256_text(text) for name, text in texts.items()},
         configuration=deciding(config),
         environment=environment(),
     )
@@ -198,7 +198,3 @@ def _clear(out: Path) -> None:
     )
     for path in paths:
         remove(path)
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()

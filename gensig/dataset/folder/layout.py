@@ -93,6 +93,10 @@ class ShardEntry:
     bytes: int = 0
     n_failed: int = 0
 
+    def failed(self) -> "ShardEntry":
+        """The entry where the shard could not be made."""
+        return ShardEntry(name=self.name, rows=self.rows, state="failed")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Manifest:

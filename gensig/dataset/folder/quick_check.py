@@ -95,16 +95,9 @@ def _altered_manifest(folder: Path, manifest: Manifest) -> list[str]:
     path = folder / CHECKSUMS
     if not manifest.is_complete or not path.is_file():
         return []
-    if read_checksums(folder).get(MANIFEST) == _digest(folder / MANIFEST):
+    if read_checksums(folder).get(MANIFEST) == sha256_file(folder / MANIFEST):
         return []
     return [f"{MANIFEST} was altered: its sha256 is not the one in {CHECKSUMS}"]
-
-
-def _digest(path: Path) -> str:
-    """The sha256 of an ordinary file; '' where there is none."""
-    if not path.is_file():
-        return ""
-    return sha256_file(path)
 
 
 def shard_sizes(folder: Path, manifest: Manifest) -> list[str]:

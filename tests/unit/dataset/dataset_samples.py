@@ -8,7 +8,7 @@ import numpy as np
 from gensig.dataset.folder.beginning import create_folder
 from gensig.dataset.folder.closing import finalize
 from gensig.dataset.folder.layout import shard_path
-from gensig.dataset.folder.manifest import identity_hash, record_shard
+from gensig.dataset.folder.manifest import identity_hash, record_shards
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.plan import Plan, record_ids, shard_rows
 from gensig.dataset.splitting.splits import SUBSETS
@@ -222,7 +222,7 @@ def build(
             twin=twin,
             **storage,
         )
-        record_shard(out, shard, writer.sha256, writer.n_bytes, writer.n_failed)
+        record_shards(out, {shard: writer.entry})
     if close:
         finalize(out, figures=figures)
     return out

@@ -10,7 +10,7 @@ import pytest
 from dataset_samples import build, make_plan
 
 from gensig.dataset.folder.closing import finalize
-from gensig.dataset.folder.manifest import read_manifest
+from gensig.dataset.folder.layout import read_manifest
 from gensig.dataset.folder.quick_check import absences
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.storage.checksums import accept_edits, read_checksums

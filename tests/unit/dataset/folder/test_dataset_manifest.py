@@ -4,6 +4,7 @@ import functools
 import json
 import multiprocessing
 import operator
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -13,13 +14,17 @@ from dataset_samples import CONFIG, build, make_plan, write_shard
 
 from gensig.dataset.folder.beginning import create_folder
 from gensig.dataset.folder.closing import finalize
-from gensig.dataset.folder.layout import read_config, shard_path
+from gensig.dataset.folder.layout import (
+    ShardEntry,
+    read_config,
+    read_manifest,
+    shard_path,
+)
 from gensig.dataset.folder.manifest import (
     deciding,
     differing_keys,
     identity_hash,
-    read_manifest,
-    record_shard,
+    record_shards,
     stored_config,
 )
 from gensig.dataset.plan import read_plan
@@ -160,12 +165,12 @@ def test_unfinished_set_cannot_be_closed(tmp_path, plan):
     with pytest.raises(DatasetError, match="3 of 4 shards are done"):
         finalize(folder)
     with pytest.raises(DatasetError, match="does not exist"):
-        record_shard(folder, 3, "0" * 64, 1, 0)
-    writer = write_shard(shard_path(folder, 3), plan, 3)
-    for wrong in (("abc", 1, 0), (writer.sha256, -1, 0), (writer.sha256, 1, 7)):
+        record_shards(folder, {3: done(3)})
+    entry = write_shard(shard_path(folder, 3), plan, 3).entry
+    for wrong in ({"sha256": "abc"}, {"bytes": -1}, {"n_failed": 7}):
         with pytest.raises(DatasetError, match=r"negative|sha256|failed of"):
-            record_shard(folder, 3, *wrong)
-    record_shard(folder, 3, writer.sha256, writer.n_bytes, writer.n_failed)
+            record_shards(folder, {3: replace(entry, **wrong)})
+    record_shards(folder, {3: entry})
     shard_path(folder, 1).write_bytes(b"x")
     with pytest.raises(DatasetError, match="recorded"):
         finalize(folder)
@@ -176,11 +181,19 @@ def test_unfinished_set_cannot_be_closed(tmp_path, plan):
 def test_closed_set_takes_no_more_shards(folder):
     finalize(folder)  # twice is harmless
     with pytest.raises(DatasetError, match="closed"):
-        record_shard(folder, 0, "0" * 64, 1, 0)
+        record_shards(folder, {0: done(0)})
+
+
+def done(shard):
+    """Entry of a shard of one row, with made-up bytes."""
+    name = f"shard-{shard:05d}.h5"
+    return ShardEntry(
+        name=name, rows=1, state="done", sha256="0" * 64, bytes=10 + shard
+    )
 
 
 def _record(folder, shard):
-    record_shard(folder, shard, f"{shard:064d}", 10 + shard, 0)
+    record_shards(folder, {shard: done(shard)})
 
 
 def test_processes_do_not_overwrite_each_other(tmp_path):
