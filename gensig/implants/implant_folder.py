@@ -45,7 +45,7 @@ from gensig.implants.implant_sources import (
     source_words,
 )
 from gensig.implants.implanting import Implanter
-from gensig.production.maker import SIMULATION, Maker
+from gensig.production.folder import SIMULATION, Maker
 from gensig.production.record_counts import RecordCounts
 from gensig.signals.resampling import PASS_SHARE
 from gensig.version import __version__
@@ -68,7 +68,6 @@ def begin_implants(out: Path, implanter: Implanter, sources: ImplantSources) -> 
         config=config | {FINGERPRINTS: _fingerprints(implanter)},
         overrides=source_words(sources, out),
         plan=plan,
-        identity=identity_hash(config, __version__),
         seed=implanter.options.seed,
         generator_version=__version__,
     )

@@ -20,7 +20,7 @@ from gensig.dataset.folder.layout import (
     read_manifest,
     shard_path,
 )
-from gensig.dataset.folder.manifest import identity_hash, record_shards
+from gensig.dataset.folder.manifest import record_shards
 from gensig.dataset.folder.quick_check import size_problem
 from gensig.dataset.folder.run_log import log
 from gensig.dataset.plan import Plan
@@ -36,7 +36,6 @@ from gensig.errors import ConfigError
 from gensig.execution.base import Executor, ShardFailure
 from gensig.options.configuration import Configuration
 from gensig.plan.make import make_plan
-from gensig.production.maker import SIMULATION, Maker
 from gensig.production.record_counts import RecordCounts
 from gensig.production.restoring import restore_index, restore_tables
 from gensig.production.run_check import (
@@ -45,9 +44,37 @@ from gensig.production.run_check import (
     require_tables,
     require_whole,
 )
+from gensig.production.shard_writing import write_shard
 from gensig.record.inputs import InputReader
 from gensig.terminal.run_progress import Progress
 from gensig.version import __version__
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Maker:
+    """Functions that make parts of a folder, each with the bits that they had.
+
+    Attributes
+    ----------
+    plan : takes folder and configuration
+    check : takes the folder; raises GensigError where no shard can be made, with one line
+    write : takes folder, number of a shard and ``counts``; executors pickle it
+    """
+
+    plan: Callable[[Path, ConfigContent], Plan]
+    check: Callable[[Path], None]
+    write: Callable[..., ShardEntry]
+
+
+def _plan(_out: Path, config: ConfigContent) -> Plan:
+    return make_plan(Configuration(config))
+
+
+def _check(_out: Path) -> None:
+    """A simulation needs nothing but the folder."""
+
+
+SIMULATION = Maker(plan=_plan, check=_check, write=write_shard)
 
 
 def begin_folder(config: Configuration, overrides: Sequence[str], out: Path) -> Plan:
@@ -69,7 +96,6 @@ def begin_folder(config: Configuration, overrides: Sequence[str], out: Path) -> 
         config=recorded,
         overrides=overrides,
         plan=plan,
-        identity=identity_hash(recorded, __version__),
         seed=config.seed,
         generator_version=__version__,
     )

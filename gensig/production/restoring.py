@@ -19,10 +19,8 @@ from gensig.dataset.storage.index import write_index
 from gensig.errors import DatasetError
 
 
-def restore_tables(
-    out: Path, manifest: Manifest, make: Callable[[], Plan]
-) -> list[str]:
-    """Make the plan and the splits again that a folder lacks; returns their names.
+def restore_tables(out: Path, manifest: Manifest, make: Callable[[], Plan]) -> None:
+    """Make the plan and the splits again that a folder lacks.
 
     Parameters
     ----------
@@ -52,7 +50,6 @@ def restore_tables(
             if table is None:
                 raise DatasetError(f"{out / name} is missing; restore it from a copy")
             _restore(out, manifest, name, table.to_csv)
-    return [name for name in lost if name != INDEX]
 
 
 def _restore(out: Path, manifest: Manifest, name: str, make: Callable[[], str]) -> None:

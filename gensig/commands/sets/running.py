@@ -20,7 +20,7 @@ from gensig.terminal.run_progress import RunProgress
 if TYPE_CHECKING:
     from gensig.dataset.folder.layout import ConfigContent
     from gensig.execution.base import Executor
-    from gensig.production.maker import Maker
+    from gensig.production.folder import Maker
 
 
 def run(

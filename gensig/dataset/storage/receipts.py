@@ -18,6 +18,7 @@ from gensig.dataset.folder.layout import (
     shard_path,
 )
 from gensig.dataset.folder.manifest import record_shards
+from gensig.dataset.folder.quick_check import size_problem
 from gensig.dataset.storage.atomic import read_text, write_text
 from gensig.errors import DatasetError
 
@@ -45,8 +46,8 @@ def shard_entries(
 
 def _entry(folder: Path, index: int, planned: ShardEntry) -> ShardEntry:
     """Entry of one shard; a receipt that does not fit its shard counts for nothing."""
-    path, shard = receipt_path(folder, index), shard_path(folder, index)
-    if planned.state == "done" or not path.is_file() or not shard.is_file():
+    path = receipt_path(folder, index)
+    if planned.state == "done" or not path.is_file():
         return planned
     try:
         text = read_text(path, limit=RECEIPT_BYTES_LIMIT)
@@ -54,9 +55,9 @@ def _entry(folder: Path, index: int, planned: ShardEntry) -> ShardEntry:
     except (DatasetError, ValueError, RecursionError):
         return planned  # damaged: the shard is made again
     fits = (entry.state, entry.rows) == ("done", planned.rows)
-    if fits and shard.stat().st_size == entry.bytes:
-        return entry
-    return planned
+    if not fits or size_problem(shard_path(folder, index), entry):
+        return planned
+    return entry
 
 
 def collect_receipts(folder: Path) -> None:

@@ -199,18 +199,17 @@ def build(
     are those of an older version.
     """
     config = CONFIG | {"seed": seed}
-    identity = identity_hash(config, "0.1.0")
     create_folder(
         out,
         config=config,
         overrides=[f"seed={seed}"],
         plan=plan,
-        identity=identity,
         seed=seed,
         generator_version="0.1.0",
     )
     for shard in shards if shards is not None else range(plan.n_shards):
         if labelled:
+            identity = identity_hash(config, "0.1.0")
             storage["attributes"] = ATTRIBUTES | {"identity": identity}
             storage["shard_index"] = shard
         writer = write_shard(

@@ -101,7 +101,6 @@ def write_pairs(folder, *, twins=True, noise=0.0, classes=CLASSES, n_units=6):
         config=config,
         overrides=[],
         plan=plan,
-        identity=identity,
         seed=0,
         generator_version=__version__,
     )

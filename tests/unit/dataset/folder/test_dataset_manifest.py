@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import yaml
 from dataset_samples import CONFIG, build, make_plan, write_shard
+from refusals import refused
 
 from gensig.dataset.folder.beginning import create_folder
 from gensig.dataset.folder.closing import finalize
@@ -36,7 +37,6 @@ def _create(out, plan, **changes):
         "config": CONFIG,
         "overrides": [],
         "plan": plan,
-        "identity": identity_hash(CONFIG, "0.1.0"),
         "seed": 7,
         "generator_version": "0.1.0",
     }
@@ -60,7 +60,7 @@ def test_identity_covers_what_decides_the_bits():
     nested = {"gear": {"n_teeth": 23, "out": 1}}
     for change in ({"seed": 8}, nested):
         assert identity_hash(CONFIG | change, "0.1.0") != base
-    with pytest.raises(DatasetError, match="plain data"):
+    with refused("plain data", DatasetError):
         identity_hash({"a": object()}, "0.1.0")
 
 
@@ -139,7 +139,7 @@ def test_existing_folder_is_not_touched(tmp_path, plan):
     (used / "mine.txt").write_text("keep")
     (tmp_path / "file").write_text("keep")
     for out in (used, tmp_path / "file"):
-        with pytest.raises(DatasetError, match="exists"):
+        with refused("exists", DatasetError):
             _create(out, plan)
     assert _tree(tmp_path) == {"used/mine.txt": b"keep", "file": b"keep"}
     (tmp_path / "empty").mkdir()
@@ -148,23 +148,20 @@ def test_existing_folder_is_not_touched(tmp_path, plan):
 
 
 def test_failure_while_creating_leaves_nothing(tmp_path, plan, monkeypatch):
-    with pytest.raises(DatasetError, match="does not belong"):
-        _create(tmp_path / "a", plan, identity="0" * 64)
-
     def full_disk(*_):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("gensig.dataset.storage.atomic.publish", full_disk)
-    with pytest.raises(DatasetError, match="No space left on device"):
+    with refused("No space left on device", DatasetError):
         _create(tmp_path / "a" / "b", plan)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_unfinished_set_cannot_be_closed(tmp_path, plan):
     folder = build(tmp_path / "a", plan, shards=range(3), close=False)
-    with pytest.raises(DatasetError, match="3 of 4 shards are done"):
+    with refused("3 of 4 shards are done", DatasetError):
         finalize(folder)
-    with pytest.raises(DatasetError, match="does not exist"):
+    with refused("does not exist", DatasetError):
         record_shards(folder, {3: done(3)})
     entry = write_shard(shard_path(folder, 3), plan, 3).entry
     for wrong in ({"sha256": "abc"}, {"bytes": -1}, {"n_failed": 7}):
@@ -172,7 +169,7 @@ def test_unfinished_set_cannot_be_closed(tmp_path, plan):
             record_shards(folder, {3: replace(entry, **wrong)})
     record_shards(folder, {3: entry})
     shard_path(folder, 1).write_bytes(b"x")
-    with pytest.raises(DatasetError, match="recorded"):
+    with refused("recorded", DatasetError):
         finalize(folder)
     assert not (folder / "index.h5").exists()
     assert not read_manifest(folder).is_complete
@@ -180,7 +177,7 @@ def test_unfinished_set_cannot_be_closed(tmp_path, plan):
 
 def test_closed_set_takes_no_more_shards(folder):
     finalize(folder)  # twice is harmless
-    with pytest.raises(DatasetError, match="closed"):
+    with refused("closed", DatasetError):
         record_shards(folder, {0: done(0)})
 
 
@@ -253,9 +250,8 @@ def test_forged_manifest_is_refused_in_one_line(folder, path, value, message):
     *parents, key = path
     functools.reduce(operator.getitem, parents, content)[key] = value
     (folder / "manifest.json").write_text(json.dumps(content))
-    with pytest.raises(DatasetError, match=message) as caught:
+    with refused(message, DatasetError):
         read_manifest(folder)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -263,7 +259,7 @@ def test_forged_manifest_is_refused_in_one_line(folder, path, value, message):
 )
 def test_manifest_that_is_none_is_refused(folder, text):
     (folder / "manifest.json").write_text(text)
-    with pytest.raises(DatasetError, match=r"manifest\.json"):
+    with refused("manifest.json", DatasetError):
         read_manifest(folder)
 
 
@@ -280,5 +276,5 @@ def test_manifest_that_is_none_is_refused(folder, text):
 )
 def test_configuration_that_is_not_plain_is_refused(folder, text):
     (folder / "config.yaml").write_text(text)
-    with pytest.raises(DatasetError, match=r"config\.yaml"):
+    with refused("config.yaml", DatasetError):
         read_config(folder)

@@ -13,6 +13,7 @@ import yaml
 from dataset_samples import build, trust
 from numpy.testing import assert_array_equal
 from pyarrow import parquet
+from refusals import refused
 from split_samples import CLASSES, FAILED, LEAKY, REFERENCES, every_protocol_plan
 
 import gensig.dataset.exports.export as export_module
@@ -274,7 +275,7 @@ def test_a_shard_with_another_machine_than_the_plan_is_refused(tmp_path, column)
     with h5py.File(shard_path(folder, 2), "r+") as file:
         file[column][3] = b"u5"
     kind = column.removesuffix("_id")
-    with pytest.raises(DatasetError, match=f"plan have different {kind} ids"):
+    with refused(f"plan have different {kind} ids", DatasetError):
         export(folder, "hf", tmp_path / "hub")
 
 
@@ -301,9 +302,8 @@ def test_mistakes_are_one_line(tmp_path, capsys, words, message):
 def test_a_set_without_a_clean_split_says_why(tmp_path):
     folder = build(tmp_path / "set", every_protocol_plan(n_records=3), references=True)
     for protocols in (None, ["all"]):
-        with pytest.raises(
-            DatasetError,
-            match=r"no split that keeps machines apart \(the plan has 1 mach",
+        with refused(
+            "no split that keeps machines apart (the plan has 1 mach", DatasetError
         ):
             export(folder, "hf", tmp_path / "hub", protocols=protocols)
     assert export(folder, "npz", tmp_path / "x.npz")["records"] == 3
@@ -312,7 +312,7 @@ def test_a_set_without_a_clean_split_says_why(tmp_path):
 @pytest.mark.parametrize("to", ["hf", "parquet"])
 def test_a_missing_package_is_named(stored, tmp_path, monkeypatch, to):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(DatasetError, match=rf"format {to} needs the package pyarrow"):
+    with refused(rf"format {to} needs the package pyarrow", DatasetError):
         export(stored, to, tmp_path / "out")
 
 
@@ -321,7 +321,7 @@ def test_a_full_disk_is_said_before_anything_is_written(stored, tmp_path, monkey
     needed = 2 * 141 * 2 * 200 * 4
     usage = SimpleNamespace(free=needed - 1)
     monkeypatch.setattr(export_module.shutil, "disk_usage", lambda _path: usage)
-    with pytest.raises(DatasetError, match=f"needs about {needed} bytes"):
+    with refused(f"needs about {needed} bytes", DatasetError):
         export(stored, "hf", tmp_path / "hub", protocols=["by_unit", "cross_gearbox"])
     assert not (tmp_path / "hub").exists()
 
