@@ -146,10 +146,10 @@ def test_a_folder_of_data_sets_names_them(tmp_path, plan):
     (runs / "notes").mkdir()
     (runs / "linked").symlink_to(tmp_path / "runs" / "a")
     for read in (verify, inspect):
-        with pytest.raises(DatasetError) as refused:
+        with pytest.raises(DatasetError) as caught:
             read(runs)
         advice = f"it holds 2 data sets, give one: {runs / 'a'}, {runs / 'b'}"
-        assert str(refused.value).endswith(advice)
+        assert str(caught.value).endswith(advice)
     for number in range(5):
         (runs / f"c{number}").mkdir()
         (runs / f"c{number}" / "manifest.json").touch()
