@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gensig.dataset.folder.beginning import create_folder
@@ -111,28 +110,6 @@ def begin_folder(config: Configuration, overrides: Sequence[str], out: Path) -> 
     return plan
 
 
-@dataclass(slots=True, kw_only=True)
-class _Tally:
-    """Records of a run: those on disk, and those that it made."""
-
-    n_records: int
-    n_done: int
-    n_failed: int
-    n_made: int = 0
-    n_bytes: int = 0
-
-    def add(self, shard: ShardEntry) -> None:
-        """Count a shard that was made."""
-        self.n_done += shard.rows
-        self.n_made += shard.rows
-        self.n_failed += shard.n_failed
-        self.n_bytes += shard.bytes
-
-    def progress(self, reason: str = "") -> Progress:
-        """The state after a shard; ``reason`` says why it could not be made."""
-        return Progress(**dataclasses.asdict(self), reason=reason)
-
-
 def run_folder(
     out: Path,
     *,
@@ -198,10 +175,13 @@ def _run_shards(
     if missing:
         maker.check(out)
     done = [index for index in mine if index not in missing]
-    tally = _Tally(
+    progress = Progress(
         n_records=sum(rows[index] for index in mine),
         n_done=sum(rows[index] for index in done),
         n_failed=sum(entries[index].n_failed for index in done),
+        n_made=0,
+        n_bytes=0,
+        reason="",
     )
     problems: list[str] = []
     made: dict[int, str] = {}
@@ -210,7 +190,7 @@ def _run_shards(
     if logged:
         n_missing = f"{len(missing)} of {len(mine)} shards to make"
         log(out, f"gensig {__version__}, {executor}: {n_missing}")
-    on_shard(tally.progress())
+    on_shard(progress)
     job = functools.partial(maker.write, out, counts=counts)
     try:
         for index, result in executor.run(job, missing):
@@ -221,8 +201,8 @@ def _run_shards(
                 problems.append(reason)
             elif isinstance(result, ShardEntry):
                 made[index] = result.sha256
-                tally.add(result)
-            on_shard(tally.progress(reason))
+                progress = _counted(progress, result)
+            on_shard(replace(progress, reason=reason))
         if not problems:
             problems = lost_shards(out, mine, made)
     except BaseException as error:
@@ -231,7 +211,18 @@ def _run_shards(
         raise
     if executor.closes and not problems:
         _close(out)
-    return tally.n_failed, problems
+    return progress.n_failed, problems
+
+
+def _counted(progress: Progress, shard: ShardEntry) -> Progress:
+    """The state after a shard that was made."""
+    return replace(
+        progress,
+        n_done=progress.n_done + shard.rows,
+        n_made=progress.n_made + shard.rows,
+        n_failed=progress.n_failed + shard.n_failed,
+        n_bytes=progress.n_bytes + shard.bytes,
+    )
 
 
 def _recorded(
