@@ -168,7 +168,7 @@ def _run_shards(
 ) -> tuple[int, list[str]]:
     """See `run_folder`."""
     manifest = read_manifest(out)
-    rows = [entry.rows for entry in manifest.shards]
+    rows = manifest.shard_sizes
     mine = executor.share(range(len(rows)))
     entries = shard_entries(out, manifest, mine)
     missing = [index for index in mine if not _is_there(out, index, entries[index])]

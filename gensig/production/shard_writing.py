@@ -57,7 +57,7 @@ def write_shard(
     DatasetError    where the folder was begun by another version than that of this process
     """
     reader, plan, manifest = _folder_inputs(out, same_file(out / PLAN))
-    sizes = [entry.rows for entry in manifest.shards]
+    sizes = manifest.shard_sizes
     n_records, begin = sizes[shard_index], sum(sizes[:shard_index])
     params = [
         name.removeprefix("params/")
@@ -128,11 +128,7 @@ def _check_rows(
 
 def block_length(system: Machine) -> int:
     """Records that are simulated at a time: enough for full speed, few enough for the memory."""
-    n_bytes = (
-        8
-        * len(system.sensing.channels)
-        * round(system.operating.duration * system.sensing.sampling_rate)
-    )
+    n_bytes = 8 * len(system.sensing.channels) * system.n_samples
     most = MOST_BLOCK
     if system.solver.backend == IMPLICIT_BACKEND:
         most = IMPLICIT_BLOCK

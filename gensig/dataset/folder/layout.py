@@ -130,6 +130,11 @@ class Manifest:
         return self.state == "complete"
 
     @property
+    def shard_sizes(self) -> list[int]:
+        """Number of records of each shard."""
+        return [entry.rows for entry in self.shards]
+
+    @property
     def n_done(self) -> int:
         """Number of finished shards."""
         return sum(entry.state == "done" for entry in self.shards)
@@ -282,7 +287,7 @@ def _holds_manifest(entry: os.DirEntry[str]) -> bool:
 
 
 def _check_manifest(manifest: Manifest) -> None:
-    rows = sum(entry.rows for entry in manifest.shards)
+    rows = sum(manifest.shard_sizes)
     if rows != manifest.n_records or not manifest.shards:
         raise DatasetError(
             f"n_records is {manifest.n_records}, the shards hold {rows}; the manifest is damaged"

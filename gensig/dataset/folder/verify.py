@@ -113,7 +113,7 @@ def damage(folder: Path, manifest: Manifest, *, quick: bool = False) -> list[str
         problems += lines
         if plan is not None:
             problems += _splits(folder, manifest, plan)
-    starts = np.cumsum([0, *(entry.rows for entry in manifest.shards)])
+    starts = np.cumsum([0, *manifest.shard_sizes])
     reference: dict | None = None
     for i, entry in enumerate(manifest.shards):
         if entry.state != "done":
@@ -229,7 +229,7 @@ def _tables(
         return [*problems, str(error)], None
     if problem := records_problem(plan.n_records, manifest):
         return [*problems, problem], None
-    if plan.shard_sizes() != [entry.rows for entry in manifest.shards]:
+    if plan.shard_sizes() != manifest.shard_sizes:
         line = f"{PLAN} and the manifest have different shards; one was altered"
         return [*problems, line], None
     return problems, plan
