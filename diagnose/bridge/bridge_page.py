@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -23,9 +22,9 @@ from diagnose.bridge.bridge_words import (
     interval_text,
     ranked_rows,
 )
-from diagnose.report.markdown import table_lines
 from diagnose.studies.result_files import environment, write_rows
 from gensig.measured.measured_set import MeasuredSet
+from gensig.text.markdown import page_text
 from gensig.text.page import Section, Table, write_page
 
 PAGE, MARKDOWN, NUMBERS, ANSWERS = (
@@ -74,8 +73,8 @@ def write_bridge(
         sections=sections,
         program="diagnose bridge",
     )
-    text = "\n".join(markdown_lines(title, lead, sections))
-    (folder / MARKDOWN).write_text(f"{text}\n", encoding="utf-8")
+    text = page_text(title, lead, sections)
+    (folder / MARKDOWN).write_text(text, encoding="utf-8")
     numbers = json.dumps(content(found, data, result), indent=2, allow_nan=False)
     (folder / NUMBERS).write_text(f"{numbers}\n", encoding="utf-8")
     write_rows(folder / ANSWERS, _answer_rows(result))
@@ -186,27 +185,6 @@ def _confusion(result: BridgeResult, method: str) -> Table:
         if found is not None
     ]
     return Table(head=("true", *result.judged.labels, "found"), rows=rows)
-
-
-def markdown_lines(
-    title: str, lead: Sequence[str], sections: Sequence[Section]
-) -> list[str]:
-    """The same page as Markdown."""
-    lines = [f"# {title}", ""]
-    for line in lead:
-        lines += [line, ""]
-    for section in sections:
-        lines += [f"## {section.title}", ""]
-        for line in section.text:
-            lines += [line, ""]
-        if section.table is not None:
-            lines += [*table_lines(section.table.head, section.table.rows), ""]
-        for term, meaning in section.notes:
-            start = f"**{term}**: " if term else ""
-            lines.append(f"- {start}{meaning}")
-        if section.notes:
-            lines.append("")
-    return lines[:-1]
 
 
 def content(found: MeasuredSet, data: Path, result: BridgeResult) -> dict[str, Any]:

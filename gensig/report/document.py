@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from gensig.dataset.cards.card import plain
 from gensig.dataset.cards.origin import origin_of
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.dataset.storage.atomic import write_bytes
@@ -44,6 +43,7 @@ from gensig.report.values import (
     some_records,
     value_table,
 )
+from gensig.text.escaping import plain
 from gensig.text.page import (
     Charts,
     Section,

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dataset.cards.card import plain
 from gensig.dataset.reader import Dataset
 from gensig.report.values import Measured
 from gensig.signals.recording import STANDARD_GRAVITY
+from gensig.text.escaping import plain
 from gensig.text.page import Table
 
 FloatArray = NDArray[np.floating]

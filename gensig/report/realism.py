@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from gensig.errors import ConfigError
 from gensig.text.csv_tables import read_records, write_rows
+from gensig.text.markdown import table_lines
 
 FOLDER = Path(__file__).resolve().parent
 RANGES, RESULTS = FOLDER / "realism_ranges.csv", FOLDER / "realism_results.csv"
@@ -200,21 +201,21 @@ def _read(line: Mapping[str, str], numbers: Sequence[str]) -> dict[str, Any]:
 
 def table(rows: Sequence[Comparison]) -> list[str]:
     """Comparisons as lines of a Markdown table."""
-    lines = [f"| {' | '.join(COLUMNS)} |", "|---" * len(COLUMNS) + "|"]
-    for row in rows:
-        cells = (
+    cells = [
+        (
             f"{row.id}, {row.unit}".rstrip(", "),
             row.at,
             shown_range(row),
             _number(row.median),
             f"{_number(row.p5)} to {_number(row.p95)}",
-            str(row.n),
+            row.n,
             row.verdict,
             row.source,
             row.reason,
         )
-        lines.append(f"| {' | '.join(cells)} |")
-    return lines
+        for row in rows
+    ]
+    return table_lines(COLUMNS, cells)
 
 
 def _number(value: float) -> str:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dataset.cards.card import plain
 from gensig.dataset.reader import Dataset
 from gensig.report.conditions import TWIN, Healthy, Shown, healthy_beside
 from gensig.report.examples import read_signals
@@ -16,6 +15,7 @@ from gensig.report.packing import pack_signal
 from gensig.report.rotation_frequencies import Rotation
 from gensig.report.signal_views import BESIDE, turn_view
 from gensig.report.turns import aligned, averaged_turn, conspicuity, gear_teeth
+from gensig.text.escaping import plain
 from gensig.text.parameters import size_words
 
 IntArray = NDArray[np.integer]

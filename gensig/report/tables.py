@@ -9,18 +9,20 @@ from pathlib import Path
 
 import numpy as np
 
-from gensig.dataset.cards.card import (
-    caveats_of,
-    plain,
-    torque_words,
+from gensig.dataset.cards.card import caveats_of
+from gensig.dataset.cards.facts import (
+    geometry_facts,
+    rounded,
+    running_facts,
+    value_range,
 )
-from gensig.dataset.cards.facts import geometry_facts, rounded, value_range
 from gensig.dataset.folder.layout import CONFIG, CONFIG_BYTES_LIMIT, OVERRIDES
 from gensig.dataset.reader import Dataset
 from gensig.dataset.splitting.dealing import GROUP_NAMES
 from gensig.dataset.splitting.protocols import PROTOCOLS
 from gensig.dataset.storage.atomic import read_text
 from gensig.report.realism import Comparison, shown_range
+from gensig.text.escaping import plain
 from gensig.text.page import Section, Table
 
 MANY_SHARDS = 200
@@ -69,21 +71,7 @@ def contents(data: Dataset) -> list[Section]:
         (IN_WORDS.get(name, name), _shown(value))
         for name, value in geometry_facts(data).items()
     ]
-    counted = {
-        "machines": "unit_id",
-        "sets of gears": "specimen_id",
-        "gearboxes": "gearbox_id",
-    }
-    rows += [
-        (name, f"{len(np.unique(data.column(column)))}")
-        for name, column in counted.items()
-    ]
-    rows += [
-        ("speed of the driving shaft", value_range(data.column("speed_rpm"), "r/min")),
-        (torque_words(data), value_range(data.column("torque_nm"), "N m")),
-    ]
-    if "snr_db" in data.column_names:
-        rows.append(("signal-to-noise ratio", value_range(data.column("snr_db"), "dB")))
+    rows += [(name, f"{value}") for name, value in running_facts(data).items()]
     if "life_id" in data.column_names:
         n_lives = len(np.unique(data.column("life_id")))
         rows.append(("lives", f"{n_lives}, to failure or to the horizon"))
@@ -264,13 +252,10 @@ def loading(data: Dataset) -> list[Section]:
             "  # [(record, start_fraction, stop_fraction), ...]"
         )
     text = ["Every shard is plain HDF5 too: h5py, MATLAB and Octave read it."]
-    caveats = [
-        " ".join(line.replace("`", "").split())
-        for line in caveats_of(data).removeprefix("- ").split("\n- ")
-    ]
+    caveats = [("", caveat.replace("`", "")) for caveat in caveats_of(data)]
     return [
         Section(title="Load it", text=text, code="\n".join(code)),
-        Section(title="What to mind", notes=[("", line) for line in caveats]),
+        Section(title="What to mind", notes=caveats),
     ]
 
 
