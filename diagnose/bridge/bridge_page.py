@@ -9,13 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from diagnose.bridge.bridge_run import METHODS, BridgeResult
-from diagnose.bridge.bridge_scores import (
-    accuracy,
-    class_recalls,
-    confusion,
-    separation,
-    specimen_counts,
-)
+from diagnose.bridge.bridge_scores import class_recalls, confusion, specimen_counts
 from diagnose.bridge.bridge_words import (
     comparisons,
     headline,
@@ -189,14 +183,11 @@ def _confusion(result: BridgeResult, method: str) -> Table:
 
 def content(found: MeasuredSet, data: Path, result: BridgeResult) -> dict[str, Any]:
     """The run as plain values."""
-    n_bootstrap = result.protocol.n_bootstrap
     methods = {}
     for method, answers in result.answers.items():
-        entry: dict[str, Any] = {
-            "healthy_against_faulty": separation(result.judged, answers.faulty)
-        }
-        if answers.predicted is not None:
-            score = accuracy(result.judged, answers.predicted, n_bootstrap=n_bootstrap)
+        entry: dict[str, Any] = {"healthy_against_faulty": result.separation(method)}
+        score = result.accuracy(method)
+        if score is not None and answers.predicted is not None:
             entry["balanced_accuracy"] = asdict(score)
             entry["confusion"] = confusion(result.judged, answers.predicted).tolist()
         methods[method] = entry
