@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -136,7 +135,7 @@ def report_text(
     sections += [
         _indicators(data, chosen, measured, content["measured"], channel_units),
         _parameters(data, content["drawn"]),
-        _comparisons(compared, channel_units),
+        tables.comparisons(compared, channel_units),
         *tables.contents(data),
         tables.splits(data),
         *tables.loading(data),
@@ -311,20 +310,6 @@ def _lives(table: dict[str, Any]) -> Section:
             plots=[("lives", "Lives over time")],
         ),
     )
-
-
-def _comparisons(compared: Sequence[Comparison], units: Sequence[str]) -> Section:
-    section = tables.measured_table(compared, units)
-    if not compared:
-        return section
-    charts = Charts(
-        name="beside",
-        label="Nothing to choose",
-        plots=[("beside", "Measured ranges and this set")],
-    )
-    assert section.table is not None  # there are comparisons
-    table = replace(section.table, folded="The same as a table")
-    return replace(section, charts=charts, table=table)
 
 
 def _of(n_rows: int, data: Dataset) -> str:

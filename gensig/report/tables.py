@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from itertools import zip_longest
 from pathlib import Path
@@ -21,9 +20,9 @@ from gensig.dataset.reader import Dataset
 from gensig.dataset.splitting.dealing import GROUP_NAMES
 from gensig.dataset.splitting.protocols import PROTOCOLS
 from gensig.dataset.storage.atomic import read_text
-from gensig.report.realism import Comparison, shown_range
+from gensig.report.realism import Comparison, number_text, shown_range
 from gensig.text.escaping import plain
-from gensig.text.page import Section, Table
+from gensig.text.page import Charts, Section, Table
 
 MANY_SHARDS = 200
 IN_WORDS = {
@@ -146,8 +145,8 @@ def splits(data: Dataset) -> Section:
     return Section(title="Splits", text=text, table=table, notes=left_out, folded=True)
 
 
-def measured_table(compared: Sequence[Comparison], units: Sequence[str]) -> Section:
-    """Values of the set with measured ranges, or the reason why there are none."""
+def comparisons(compared: Sequence[Comparison], units: Sequence[str]) -> Section:
+    """Values of the set beside measured ranges, or the reason why there are none."""
     text = [
         "Central 90 % of this set's values beside ranges of published recordings of a "
         "two-stage parallel spur gearbox (5 kHz, one set of gears a class), which is another "
@@ -166,9 +165,9 @@ def measured_table(compared: Sequence[Comparison], units: Sequence[str]) -> Sect
             item.id,
             item.at,
             shown_range(item),
-            _number(item.median),
-            f"{_number(item.p5)} to {_number(item.p95)}",
-            f"{item.n}",
+            number_text(item.median),
+            f"{number_text(item.p5)} to {number_text(item.p95)}",
+            item.n,
             item.verdict,
         )
         for item in compared
@@ -183,7 +182,14 @@ def measured_table(compared: Sequence[Comparison], units: Sequence[str]) -> Sect
         "verdict",
     )
     return Section(
-        title="Beside measurements", text=text, table=Table(head=head, rows=rows)
+        title="Beside measurements",
+        text=text,
+        charts=Charts(
+            name="beside",
+            label="Nothing to choose",
+            plots=[("beside", "Measured ranges and this set")],
+        ),
+        table=Table(head=head, rows=rows, folded="The same as a table"),
     )
 
 
@@ -276,9 +282,3 @@ def _compact(value: object) -> str:
     if isinstance(value, (int, float)):
         return f"{value:g}"
     return plain(value)
-
-
-def _number(value: float) -> str:
-    if math.isnan(value):
-        return "none"
-    return f"{value:.3g}"

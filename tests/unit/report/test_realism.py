@@ -10,15 +10,10 @@ from dataclasses import replace
 import pytest
 from measured_range import measured
 
+from benchmarks._realism_results import read_results, write_results
 from gensig.errors import ConfigError
 from gensig.report import realism
-from gensig.report.realism import (
-    compare,
-    judge,
-    read_ranges,
-    read_results,
-    write_results,
-)
+from gensig.report.realism import compare, judge, read_ranges
 
 NAN = math.nan
 
