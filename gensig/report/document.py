@@ -15,7 +15,13 @@ from gensig.errors import ConfigError
 from gensig.report import tables
 from gensig.report.conditions import Choice, choose
 from gensig.report.examples import usable_top
-from gensig.report.levels import VELOCITY, level_table, loudness, velocity_rms
+from gensig.report.levels import (
+    VELOCITY,
+    class_levels,
+    level_table,
+    loudness,
+    velocity_rms,
+)
 from gensig.report.measured_ranges import at_measured_rate, compare_with_measurements
 from gensig.report.packing import pack_floats
 from gensig.report.realism import Comparison
@@ -270,13 +276,11 @@ def _indicators(
     ]
     if not known:
         return Section(title="Condition indicators", text=["No record tells one."])
-    levels = level_table(data, measured, chosen.channels, units)
-    if levels is not None:
-        text += loudness(data, measured, chosen.channels, units)
+    levels = class_levels(data, measured, chosen.channels, units)
     return Section(
         title="Condition indicators",
-        text=text,
-        table=levels,
+        text=[*text, *loudness(levels)],
+        table=level_table(levels),
         charts=Charts(
             name="indicators",
             label="Choice of indicator",
