@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
     from gensig.faults.base import Fault
     from gensig.implants.implanting import Given
-    from gensig.production.fault_pairs import FaultPairs
+
+    # named by diagnose, which imports nothing else of the physics
+    from gensig.production.fault_pairs import FaultPairs as FaultPairs
+    from gensig.production.fault_pairs import PairCell as PairCell
     from gensig.production.streaming import RecordStream
     from gensig.systems.base import Machine
 

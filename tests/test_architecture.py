@@ -111,7 +111,7 @@ GENSIG = {
 }
 DIAGNOSE = {
     "baselines": "data networks scoring",
-    "bridge": "data detection report scoring settings studies training",
+    "bridge": "data detection scoring settings studies training",
     "commands": "bridge data detectability detection progress recordings report settings "
     "studies training",
     "detectability": "workers",

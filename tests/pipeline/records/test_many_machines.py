@@ -107,7 +107,7 @@ def test_cards_give_the_range_of_the_designs(many):
     text = (many.folder / "README.md").read_text()
     teeth = many.n_teeth("pinion")
     assert "| designs of gears | 4 |" in text
-    assert f"| n\\_teeth\\_pinion | {teeth.min()} to {teeth.max()} |" in text
+    assert f"| n_teeth_pinion | {teeth.min()} to {teeth.max()} |" in text
     biases = json.loads((many.folder / "croissant.json").read_text())["rai:dataBiases"]
     assert any("in 4 designs: " in line for line in biases)
 

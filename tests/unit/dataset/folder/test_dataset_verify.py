@@ -198,15 +198,15 @@ def test_card_states_facts_and_escapes(tmp_path, plan):
     named = Plan(columns={**plan.columns, "label_name": names})
     card = (build(tmp_path / "a_b", named, failed=3) / "README.md").read_text()
     for part in (
-        "\n# a\\_b\n",
+        "\n# a_b\n",
         "36, of which 1 failed",
         "1000 Hz",
         "0.2 s (200 samples)",
-        "n\\_teeth\\_pinion | 23",
+        "n_teeth_pinion | 23",
         "CC BY 4.0",
         "1800 to 1835 r/min",
-        "wheel\\_ü (m/s^2)",
-        "by\\_unit |",
+        "wheel_ü (m/s^2)",
+        "by_unit |",
         "&lt;script&gt;\\|\\`\\* | 12 | 0.25 |",
     ):
         assert part in card, part

@@ -204,7 +204,7 @@ def test_descriptions_name_the_scale(whole, folder):
         shard_path(whole, 0)
     )
     card = (whole / "README.md").read_text()
-    assert "times acceleration\\_scale" in card
+    assert "times acceleration_scale" in card
     assert "blosc2 (read with hdf5plugin)" in card
     assert "int16" not in (folder / "README.md").read_text()
 
