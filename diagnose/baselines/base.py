@@ -62,7 +62,6 @@ class Source:
     ----------
     task, protocol : records, labels and split
     features : key of `diagnose.baselines.features.FEATURES`
-    minirocket_features : number of features
     windows : returns the windows of each subset
     caches : by name of the input, filled and used, so that protocols share common values
     """
@@ -70,7 +69,6 @@ class Source:
     task: Task
     protocol: str
     features: str
-    minirocket_features: int
     windows: Callable[[], Mapping[str, WindowSet]]
     caches: dict[str, Cache]
 

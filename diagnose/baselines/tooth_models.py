@@ -1,4 +1,4 @@
-"""Simple models on the teeth of both gears that their sisters do not explain."""
+"""A simple model on the teeth of both gears that their sisters do not explain."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.baselines.base import (
-    Baseline,
     Input,
     MethodText,
     Parts,
@@ -18,7 +17,6 @@ from diagnose.baselines.base import (
 )
 from diagnose.baselines.estimators import (
     FittedModel,
-    boosted_trees,
     linear_model,
     logistic_regression,
 )
@@ -165,27 +163,3 @@ class ToothLogistic(StorableBaseline):
             "kind": cls.text.name,
             "samples_per_tooth": SAMPLES_PER_TOOTH,
         }
-
-
-@final
-class ToothTrees(Baseline):
-    """Gradient boosting on `tooth_features`."""
-
-    text = MethodText(
-        name="tooth_trees",
-        label="teeth, boosted trees",
-        card_label=None,
-        meaning="gradient boosting on the same table of teeth.",
-    )
-    role = Role.RIVAL
-    reads = TEETH_INPUT
-    _model: FittedModel
-
-    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
-        """Fit to the training rows; there is no choice."""
-        self._model = boosted_trees(train, n_classes)
-        return f"gradient boosting on {len(self._model.columns)} columns"
-
-    def predict_proba(self, table: FeatureTable) -> FloatArray:
-        """Probabilities (row, class) of the boosted trees."""
-        return self._model.probability(table)
