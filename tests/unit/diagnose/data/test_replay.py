@@ -11,7 +11,7 @@ from fake_stream import FakeStream
 from torch.utils.data import DataLoader
 
 from diagnose.data import Gain, ReplayStream, StreamingDataset
-from diagnose.data.loading.records_ahead import RecordsAhead
+from diagnose.data.loading.replay import RecordsAhead
 from gensig.errors import ConfigError, DatasetError
 
 WINDOW = {"window_samples": 700, "stride_samples": 300}

@@ -9,7 +9,7 @@ import pytest
 from fake_stream import FakeStream
 from torch.utils.data import DataLoader
 
-from diagnose.data.torch_sets import StreamingDataset, VibrationDataset
+from diagnose.data import StreamingDataset, VibrationDataset
 from gensig.errors import ConfigError, DatasetError
 
 WINDOW = {"window_samples": 700, "stride_samples": 300}
