@@ -85,6 +85,19 @@ class Source:
         """Stretches of records of a subset."""
         return subset_segments(self.task, self.protocol, subset)
 
+    def tables(
+        self,
+        name: str,
+        table: Callable[[Task, Segments, Cache], FeatureTable],
+        subsets: Iterable[str] = SUBSETS,
+    ) -> Parts:
+        """Tables of the stretches of subsets, with the cache of a name."""
+        cache = self.caches.setdefault(name, {})
+        return Parts.of(
+            lambda subset: table(self.part(subset), self.segments(subset), cache),
+            subsets,
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
