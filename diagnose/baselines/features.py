@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -48,7 +49,7 @@ BURST_WINDOW = (
 )
 # channels, record, first sample and sample after the last -> values
 Key = tuple[tuple[str, ...], int, int, int]
-Cache = dict[Key, FloatArray]
+Cache = dict[Key, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
