@@ -11,14 +11,8 @@ from numpy.typing import NDArray
 
 from diagnose.data.groups import Group, groups_of
 from diagnose.data.windows import FloatArray, IntArray
-from diagnose.scoring.judged import (
-    Judged,
-    finite,
-    interval_text,
-    resampled_score,
-    score,
-    with_interval,
-)
+from diagnose.scoring.intervals import finite, interval_text, with_interval
+from diagnose.scoring.judged import Judged, resampled_score, score
 from diagnose.scoring.machines import CountArray, Support
 
 if TYPE_CHECKING:
@@ -101,12 +95,12 @@ def by_condition(
     drawn = network.machines.drawn(n_bootstrap, rng)
     rows: list[dict[str, Any]] = []
     tested: list[_Compared] = []
-    n_groups = int(np.clip(network.label.size // RECORDS_A_GROUP, 1, MOST_GROUPS))
+    n_groups = int(np.clip(network.truth.size // RECORDS_A_GROUP, 1, MOST_GROUPS))
     for column, values in columns.items():
         groups = groups_of(values, most=n_groups)
         if len(groups) < 2:
             continue
-        measure = _measure(network.label, groups)
+        measure = _measure(network.truth, groups)
         for group in groups:
             compared = _compared(column, group, measure, methods, drawn, rng)
             rows.append(compared.row)
@@ -195,7 +189,7 @@ def _standard_error(network: Judged, compared: _Compared) -> float:
     """Standard error of the difference between a group and the rest."""
     overall = score(network, compared.row["measure"])
     n_inside, n_groups = compared.row["n_records"], compared.support.n_groups
-    n_outside = network.label.size - n_inside
+    n_outside = network.truth.size - n_inside
     of_records = np.sqrt(overall * (1 - overall) * (1 / n_inside + 1 / n_outside))
     spread = np.nanstd(compared.differences)
     of_machines = spread * np.sqrt(n_groups / (n_groups - 1))

@@ -8,15 +8,10 @@ from typing import Any
 import numpy as np
 
 from diagnose.data.windows import FloatArray
-from diagnose.scoring.judged import (
-    Judged,
-    resampled_score,
-    score,
-    too_few_text,
-    with_interval,
-)
+from diagnose.scoring.intervals import too_few_text, with_interval
+from diagnose.scoring.judged import Judged, resampled_score, score
+from diagnose.scoring.metrics import ACCURACY
 
-ACCURACY = "balanced_accuracy"
 N_PERMUTATIONS = 9999  # all of them if there are fewer
 
 
@@ -109,7 +104,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
 def _part_of_group(judged: Judged) -> FloatArray:
     """(group,) contribution of each group to the balanced accuracy, mean over the seeds."""
     hits = np.diagonal(judged.confusion(), axis1=-2, axis2=-1).mean(axis=0)
-    totals = np.bincount(judged.label, minlength=hits.shape[1])
+    totals = np.bincount(judged.truth, minlength=hits.shape[1])
     present = totals > 0
     of_unit = (hits[:, present] / totals[present]).sum(axis=1) / present.sum()
     group = judged.machines.coarsest().group
