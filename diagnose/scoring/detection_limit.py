@@ -136,14 +136,14 @@ class _Alarms:
         weight = self.weight[:, member]
         alarms = (weight * self.detected[:, member]).sum(axis=1)
         shares = ratio(alarms, weight.sum(axis=1))
-        return share_with_interval(float(shares[0]), shares[1:], self.support(member))
+        return share_with_interval(shares, self.support(member))
 
     def area(self, faulty: Mask) -> Interval:
         """Area under the ROC curve, mean over the trainings drawn."""
         unit = self.judged.unit
         of_seeds = areas(self.scores, faulty, self.healthy, unit, self.drawn)
         area = np.take_along_axis(of_seeds, self.seeds, axis=1).mean(axis=1)
-        return with_interval(area[0], area[1:], self.support(faulty))
+        return with_interval(area, self.support(faulty))
 
     def of_class(self, member: Mask, sizes: Sizes) -> dict[str, Any]:
         """Results of one class, without its summary."""
@@ -327,7 +327,7 @@ def _limit_rows(
     rows = []
     for share in SHARES:
         values = limits(coefficients, size, share)
-        interval = with_interval(values[0], values[1:], support)
+        interval = with_interval(values, support)
         status = "reached"
         if values[0] == size.min():
             status = "at_smallest_tested"

@@ -38,28 +38,23 @@ def percentile_interval(
 
 
 def with_interval(
-    value: float,
-    resampled: FloatArray,
-    support: Support,
-    quantile: Quantile = "inverted_cdf",
+    values: FloatArray, support: Support, quantile: Quantile = "inverted_cdf"
 ) -> Interval:
     """Value with its `percentile_interval`.
 
     Parameters
     ----------
-    value : of all machines
-    resampled : (resample,) values of resampled machines; NaN if a resample has none
+    values : (1 + resample,) of all machines, then of resampled ones; NaN if a resample has none
     support : groups behind the value; `diagnose.scoring.machines.LEAST_UNITS` are needed
     quantile : ``inverted_cdf`` for values that may be infinite
     """
-    low, high = percentile_interval(resampled, support, quantile)
-    ends: Interval = {
-        "mean": finite(value),
+    low, high = percentile_interval(values[1:], support, quantile)
+    return {
+        "mean": finite(values[0]),
         "low": low,
         "high": high,
         "too_few": support.too_few,
     }
-    return ends
 
 
 def of_seeds(
@@ -76,10 +71,8 @@ def of_seeds(
     }
 
 
-def share_with_interval(
-    value: float, resampled: FloatArray, support: Support
-) -> Interval:
-    """A share of records with its interval.
+def share_with_interval(values: FloatArray, support: Support) -> Interval:
+    """A share of records with its interval; values as of `with_interval`.
 
     It is the exact interval of as many independent trials as there are groups of machines, extended
     to that of `with_interval`, which has the spread of trainings and thresholds too. A resample of
@@ -88,9 +81,9 @@ def share_with_interval(
     Source: Clopper & Pearson (1934), "The use of confidence or fiducial limits illustrated in the
     case of the binomial", Biometrika 26 (4).
     """
-    interval = with_interval(value, resampled, support)
+    interval = with_interval(values, support)
     ends = interval["low"], interval["high"]
-    interval["low"], interval["high"] = extended(*ends, value, support)
+    interval["low"], interval["high"] = extended(*ends, float(values[0]), support)
     return interval
 
 

@@ -134,10 +134,12 @@ def judged_answers(
     )
 
 
-def resampled_score(
+def drawn_scores(
     judged: Judged, measure: str, drawn: CountArray, rng: np.random.Generator
 ) -> FloatArray:
-    """(resample,) score of `MEASURES`, mean over resampled seeds; NaN without a drawn record.
+    """(1 + resample,) score of all machines and seeds, then of resampled ones, see `MEASURES`.
+
+    NaN where a resample draws no record.
 
     Parameters
     ----------
@@ -148,7 +150,8 @@ def resampled_score(
     rng : draws the seeds
     """
     counts = np.einsum("bu,sutp->bstp", drawn, judged.confusion())
-    return over_drawn_seeds(MEASURES[measure](counts), rng)
+    resampled = over_drawn_seeds(MEASURES[measure](counts), rng)
+    return np.concatenate([[score(judged, measure)], resampled])
 
 
 def score(judged: Judged, measure: str) -> float:

@@ -152,9 +152,8 @@ def life_scores(
     lives, seeds = drawn(n_seeds, machines, n_bootstrap, rng)
     scores = {}
     for name, table in values.items():
-        mean = _finished(name, table.mean(axis=1)).mean()
-        resampled = _over_drawn(name, table, lives, seeds)
-        scores[name] = with_interval(mean, resampled, machines.support(), "linear")
+        drawn_means = _over_drawn(name, table, lives, seeds)
+        scores[name] = with_interval(drawn_means, machines.support(), "linear")
     return scores
 
 
@@ -175,8 +174,7 @@ def gain(
     other_seeds = rng.integers(against.shape[0], size=(n_bootstrap, against.shape[0]))
     of_other = _over_drawn("rmse_h", against, lives, other_seeds)
     of_values = _over_drawn("rmse_h", values, lives, seeds)
-    mean = np.sqrt(against.mean(axis=1)).mean() - np.sqrt(values.mean(axis=1)).mean()
-    return with_interval(mean, of_other - of_values, machines.support(), "linear")
+    return with_interval(of_other - of_values, machines.support(), "linear")
 
 
 def drawn(
@@ -192,10 +190,11 @@ def drawn(
 
 
 def _over_drawn(name: str, table: FloatArray, lives: Any, seeds: Any) -> FloatArray:
-    """(draw,) the measure of resampled lives, mean over the seeds drawn."""
+    """(1 + draw,) the measure of all lives and seeds, then of those drawn."""
     means = ratio(lives @ table.T, lives.sum(axis=1, keepdims=True))
-    by_seed = _finished(name, means)
-    return np.take_along_axis(by_seed, seeds, axis=1).mean(axis=1)
+    resampled = np.take_along_axis(_finished(name, means), seeds, axis=1).mean(axis=1)
+    mean = _finished(name, table.mean(axis=1)).mean()
+    return np.concatenate([[mean], resampled])
 
 
 def _finished(name: str, mean: FloatArray) -> FloatArray:

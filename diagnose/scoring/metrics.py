@@ -152,15 +152,13 @@ def ratio_with_interval(
     """
     score, machines = MEASURES[name], machines or Machines.alone(confusion.shape[1])
     support, drawn = machines.support(), machines.drawn(n_bootstrap, rng)
-    means, resampled = [], []
+    values = []
     for counts in (confusion, reference):
-        values = score(np.einsum("bu,sutp->bstp", drawn, counts))
-        resampled.append(over_drawn_seeds(values, rng))
-        means.append(np.mean(score(counts.sum(axis=1))))
+        resampled = score(np.einsum("bu,sutp->bstp", drawn, counts))
+        mean = score(counts.sum(axis=1)).mean()
+        values.append(np.concatenate([[mean], over_drawn_seeds(resampled, rng)]))
     least = np.finfo(float).tiny  # for a reference that finds nothing in a resample
-    ratios = resampled[0] / np.maximum(resampled[1], least)
-    mean = float(means[0] / max(means[1], least))
-    return with_interval(mean, ratios, support, "linear")
+    return with_interval(values[0] / np.maximum(values[1], least), support, "linear")
 
 
 def over_drawn_seeds(resampled: FloatArray, rng: np.random.Generator) -> FloatArray:

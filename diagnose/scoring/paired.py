@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnose.data.windows import FloatArray
 from diagnose.scoring.intervals import too_few_text, with_interval
-from diagnose.scoring.judged import Judged, resampled_score, score
+from diagnose.scoring.judged import Judged, drawn_scores
 from diagnose.scoring.metrics import ACCURACY
 
 N_PERMUTATIONS = 9999  # all of them if there are fewer
@@ -43,11 +43,10 @@ def compare(
     rejective multiple test procedure", Scandinavian Journal of Statistics 6 (2).
     """
     drawn, support = network.machines.drawn(n_bootstrap, rng), network.support
-    of_network = resampled_score(network, ACCURACY, drawn, rng)
+    of_network = drawn_scores(network, ACCURACY, drawn, rng)
     rows: list[dict[str, Any]] = []
     for other in others:
-        difference = score(network, ACCURACY) - score(other, ACCURACY)
-        resampled = of_network - resampled_score(other, ACCURACY, drawn, rng)
+        difference = of_network - drawn_scores(other, ACCURACY, drawn, rng)
         rows.append(
             {
                 "method": network.method,
@@ -55,7 +54,7 @@ def compare(
                 "n_units": network.n_units,
                 "n_swapped": support.n_groups,
                 "swapped": support.kind,
-                "difference": with_interval(difference, resampled, support),
+                "difference": with_interval(difference, support),
                 "p_value": permutation_p_value(network, other, rng),
             }
         )

@@ -10,8 +10,8 @@ import numpy as np
 
 from diagnose.data.windows import IntArray
 from diagnose.scoring.intervals import Interval, interval_text, with_interval
-from diagnose.scoring.judged import Judged, resampled_score, score
-from diagnose.scoring.metrics import over_records
+from diagnose.scoring.judged import Judged, drawn_scores
+from diagnose.scoring.metrics import ACCURACY, over_records
 from diagnose.scoring.predictions import Rows
 
 
@@ -43,7 +43,7 @@ def by_window_length(
     longest = int(max(position.max() for position in positions)) + 1
     counts = [1 << power for power in range((longest - 1).bit_length())] + [longest]
     drawn, support = judged.machines.drawn(n_bootstrap, rng), judged.support
-    rows, resampled, scores = [], [], []
+    rows, scores = [], []
     for count in counts:
         by_record = []
         for part, position in zip(windows, positions, strict=True):
@@ -53,19 +53,15 @@ def by_window_length(
         shorter = replace(judged, answers=np.stack(by_record))
         # the same seeds in every row, so that only the length differs
         seeds = np.random.default_rng(0)
-        values = resampled_score(shorter, "balanced_accuracy", drawn, seeds)
-        mean = score(shorter, "balanced_accuracy")
+        scores.append(drawn_scores(shorter, ACCURACY, drawn, seeds))
         rows.append(
             {
                 "n_windows": count,
                 "seconds": window_seconds + (count - 1) * step_seconds,
-                "balanced_accuracy": with_interval(mean, values, support),
+                ACCURACY: with_interval(scores[-1], support),
             }
         )
-        resampled.append(values)
-        scores.append(mean)
-    differences = resampled[-1] - resampled[0]
-    gain = with_interval(scores[-1] - scores[0], differences, support)
+    gain = with_interval(scores[-1] - scores[0], support)
     return {
         "method": judged.method,
         "rows": rows,

@@ -19,10 +19,9 @@ from diagnose.scoring.detection_limit import HEALTHY, detection, size_columns
 from diagnose.scoring.intervals import with_interval
 from diagnose.scoring.judged import (
     Judged,
+    drawn_scores,
     judged_answers,
     judged_runs,
-    resampled_score,
-    score,
 )
 from diagnose.scoring.metrics import ACCURACY
 from diagnose.scoring.paired import compare
@@ -111,18 +110,15 @@ def leak_answer(
     leaky, clean : of the network, one a seed
     """
     judged = [judged_runs(task, runs) for runs in (leaky, clean)]
-    rng = _generator()
-    resampled = [
-        resampled_score(
-            one, ACCURACY, one.machines.drawn(settings.n_bootstrap, rng), rng
-        )
+    rng, n_bootstrap = _generator(), settings.n_bootstrap
+    leaky_scores, clean_scores = (
+        drawn_scores(one, ACCURACY, one.machines.drawn(n_bootstrap, rng), rng)
         for one in judged
-    ]
-    difference = score(judged[0], ACCURACY) - score(judged[1], ACCURACY)
+    )
     support = min((one.support for one in judged), key=lambda part: part.n_groups)
     return {
         "against": clean[0].protocol,
-        "difference": with_interval(difference, resampled[0] - resampled[1], support),
+        "difference": with_interval(leaky_scores - clean_scores, support),
     }
 
 

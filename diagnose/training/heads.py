@@ -146,16 +146,17 @@ def _severity_error(
     """Error of the severities of one class, whose training records have those given."""
     error = np.abs(judged.answers[..., label] - judged.truth).mean(axis=0)
     drawn = judged.machines.drawn(n_bootstrap, rng)
-    means = ratio(
+    resampled = ratio(
         drawn @ np.bincount(judged.unit, weights=error),
         drawn @ np.bincount(judged.unit),
     )
+    means = np.concatenate([[error.mean()], resampled])
     known = in_training[~np.isnan(in_training)]
     constant = None
     if known.size:
         constant = float(np.abs(np.median(known) - judged.truth).mean())
     return {
-        **with_interval(error.mean(), means, judged.support, "linear"),
+        **with_interval(means, judged.support, "linear"),
         "constant": constant,
         "n_records": int(judged.truth.size),
     }

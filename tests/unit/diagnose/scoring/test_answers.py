@@ -193,7 +193,7 @@ def test_one_unit_has_no_interval():
     assert result["weakest"] == []
     assert "Too few test records or machines" in result["summary"]
     unknown = with_interval(
-        0.5, np.full(10, np.nan), Support(kind="machines", n_groups=9)
+        np.array([0.5] + 10 * [np.nan]), Support(kind="machines", n_groups=9)
     )
     assert unknown == {"mean": 0.5, "low": None, "high": None, "too_few": None}
 

@@ -265,7 +265,7 @@ def test_one_unit_has_no_interval_and_one_severity_no_curve():
 
 def test_all_of_few_units_do_not_prove_a_share_of_one():
     eight = Support(kind="machines", n_groups=8)
-    interval = share_with_interval(1.0, np.ones(50), eight)
+    interval = share_with_interval(np.ones(51), eight)
     assert_allclose(
         interval["low"],
         0.025 ** (1 / 8),
@@ -277,13 +277,13 @@ def test_all_of_few_units_do_not_prove_a_share_of_one():
 def test_the_interval_of_a_rate_is_exact_over_groups_of_machines():
     """As many independent trials, whatever few resamples show; more where these spread more."""
     twenty = Support(kind="machines", n_groups=20)
-    one_of_twenty = share_with_interval(0.05, np.full(50, 0.05), twenty)
+    one_of_twenty = share_with_interval(np.full(51, 0.05), twenty)
     exact = binomtest(1, 20).proportion_ci(0.95, method="exact")
     assert_allclose(
         [one_of_twenty["low"], one_of_twenty["high"]], [exact.low, exact.high]
     )
     assert 0.24 < exact.high < 0.25
-    spread = share_with_interval(0.5, np.linspace(0, 1, 101), twenty)
+    spread = share_with_interval(np.array([0.5, *np.linspace(0, 1, 101)]), twenty)
     assert_allclose([spread["low"], spread["high"]], [0.02, 0.98], atol=0.011)
     half = exact_interval(0.125, 4)  # half a success
     assert exact_interval(0.0, 4)[1] < half[1] < exact_interval(0.25, 4)[1]
