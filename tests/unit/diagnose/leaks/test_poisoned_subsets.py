@@ -16,8 +16,8 @@ CALIBRATED = {
         "temperature",
         "domain_threshold",
     },
-    "novelty": {"validation_score", "threshold"},
-    "lives": {"validation", "half_width", "facts", "domain_threshold"},
+    "novelty": {"validation", "threshold"},
+    "lives": {"validation", "hours_half_width_h", "domain_threshold"},
 }
 BY_TEMPERATURE = "open_set/largest_probability"  # its scores are calibrated
 
