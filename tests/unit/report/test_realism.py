@@ -11,14 +11,9 @@ import pytest
 from measured_range import measured
 from refusals import refused
 
+from benchmarks._realism_results import read_results, write_results
 from gensig.report import realism
-from gensig.report.realism import (
-    compare,
-    judge,
-    read_ranges,
-    read_results,
-    write_results,
-)
+from gensig.report.realism import compare, judge, read_ranges
 
 NAN = math.nan
 
