@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnose.data.protocols import left_out_lines
 from diagnose.report.methods import controls_on_cards, rivals_on_cards
-from diagnose.report.novelty_report import novelty_caveats
+from diagnose.scoring.alarm_threshold import FALSE_ALARMS, LEAST_HEALTHY
 from diagnose.scoring.judged import drawn_text, interval_text, too_few_text
 from diagnose.scoring.machines import LEAST_UNITS, MACHINES, Support
 from diagnose.scoring.metrics import is_above
@@ -30,14 +30,18 @@ TRUST_HEAD = (
 )
 
 
-def score_cell(method: Content | None) -> str:
-    """Balanced accuracy with its interval, "-" for a method that was not run."""
-    if method is None:
+def shown(score: Content | float | None) -> str:
+    """A score with its interval where it has one; "-" for one that was not taken."""
+    if score is None:
         return "-"
-    value = method["balanced_accuracy"]
-    if isinstance(value, float):
-        return f"{value:.2f}"
-    return interval_text(value)
+    if isinstance(score, int | float):
+        return f"{score:.2f}"
+    return interval_text(score)
+
+
+def score_cell(method: Content | None) -> str:
+    """Balanced accuracy of a method; "-" for one that was not run."""
+    return shown(method and method["balanced_accuracy"])
 
 
 def shown_score(result: Content, method: str) -> str:
@@ -202,8 +206,7 @@ def recall_table(clean: Content, model: str, class_names: Sequence[str]) -> Tabl
     rows = []
     for protocol, result in clean.items():
         recall = result["methods"][model]["recall"]
-        cells = {name: f"{share:.2f}" for name, share in recall.items()}
-        rows.append([protocol, *(cells.get(name, "-") for name in class_names)])
+        rows.append([protocol, *(shown(recall.get(name)) for name in class_names)])
     return Table(head=["protocol", *class_names], rows=rows)
 
 
@@ -307,7 +310,7 @@ def caveats(metrics: Content) -> list[str]:
                 f"{name}: only {n_groups} {kind} in the test part. The interval shows the spread "
                 f"of these and is too narrow for new ones; at least {FEW_UNITS} are advisable."
             )
-    lines += novelty_caveats(metrics["novelty"], FEW_UNITS)
+    lines += novelty_caveats(metrics["novelty"])
     if metrics["settings"]["normalise"] == "rms":
         lines.append(
             "The network sees windows without their level, the indicators with it unless stated; "
@@ -318,4 +321,23 @@ def caveats(metrics: Content) -> list[str]:
         lines.append(f"The baseline {name} is left out of {reason}.")
     if n_failed := metrics["n_records_unusable"]:
         lines.append(f"{n_failed} record(s) failed in simulation and are left out.")
+    return lines
+
+
+def novelty_caveats(novelty: Content) -> list[str]:
+    """Weaknesses of the scores of novelty, one line each."""
+    lines = []
+    for name, result in novelty.items():
+        support = fewest(result)
+        if support.n_groups < FEW_UNITS:
+            lines.append(
+                f"{name}: only {support.n_groups} {support.kind} in the test part; at least "
+                f"{FEW_UNITS} are advisable."
+            )
+        if (n_records := result["n_records"]["validation"]) < LEAST_HEALTHY:
+            lines.append(
+                f"{name}: {n_records} validation record(s); with fewer than {LEAST_HEALTHY} no "
+                f"threshold promises {FALSE_ALARMS:.0%} of false alarms, "
+                "the largest score is taken."
+            )
     return lines

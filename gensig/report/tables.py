@@ -10,6 +10,7 @@ import numpy as np
 
 from gensig.dataset.cards.card import caveats_of
 from gensig.dataset.cards.facts import (
+    class_examples,
     geometry_facts,
     rounded,
     running_facts,
@@ -82,20 +83,15 @@ def contents(data: Dataset) -> list[Section]:
 
 
 def _classes(data: Dataset) -> Table:
-    is_example = ~data.is_reference
-    label = data.column("label_name")[is_example]
-    unit = data.column("unit_id")[is_example]
-    all_severities = data.column("severity")[is_example]
-    order = [*data.class_names, *sorted(set(label.tolist()) - set(data.class_names))]
+    unit, severities = data.column("unit_id"), data.column("severity")
     rows = []
-    for name in order:
-        is_class = label == name
-        severity, median = all_severities[is_class], "none"
+    for name, mine in class_examples(data).items():
+        severity, median = severities[mine], "none"
         if np.isfinite(severity).any():
             median = f"{np.nanmedian(severity):.3g}"
-        n_units = len(np.unique(unit[is_class]))
+        n_units = len(np.unique(unit[mine]))
         spread = value_range(severity, "")
-        rows.append((plain(name), f"{is_class.sum()}", f"{n_units}", spread, median))
+        rows.append((plain(name), mine.sum(), n_units, spread, median))
     return Table(
         head=("class", "records", "machines", "severity", "its median"), rows=rows
     )

@@ -8,7 +8,12 @@ import yaml
 
 from gensig.dataset.cards.class_figures import write_class_figures
 from gensig.dataset.cards.croissant import croissant_text
-from gensig.dataset.cards.facts import geometry_facts, running_facts, value_range
+from gensig.dataset.cards.facts import (
+    class_examples,
+    geometry_facts,
+    running_facts,
+    value_range,
+)
 from gensig.dataset.cards.origin import origin_of
 from gensig.dataset.folder.layout import CARD, CROISSANT, SHARDS
 from gensig.dataset.reader import Dataset, open_dataset
@@ -197,14 +202,11 @@ def set_facts(data: Dataset) -> list[tuple[object, ...]]:
 
 def class_rows(data: Dataset) -> list[tuple[object, ...]]:
     """Rows of class, number of records and range of severity, without reference records."""
-    is_example = ~data.is_reference
-    names = data.column("label_name")[is_example]
-    severity = data.column("severity")[is_example]
-    order = [name for name in data.class_names if (names == name).any()]
-    order += sorted(set(names.tolist()) - set(order))
+    severity = data.column("severity")
     return [
-        (name, int((names == name).sum()), value_range(severity[names == name], ""))
-        for name in order
+        (name, int(mine.sum()), value_range(severity[mine], ""))
+        for name, mine in class_examples(data).items()
+        if mine.any()
     ]
 
 

@@ -3,6 +3,7 @@
 from contextlib import suppress
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gensig.dataset.columns import GEAR_COLUMNS, GEAR_NAMES, GEAR_PINION_TURNS
 from gensig.dataset.reader import Dataset
@@ -59,6 +60,16 @@ def geometry_facts(data: Dataset) -> dict[str, object]:
         elif name in data.attributes:
             facts[name] = rounded(data.attributes[name])
     return facts | gear_facts(data)
+
+
+def class_examples(data: Dataset) -> dict[str, NDArray[np.bool_]]:
+    """(record,) by class name: the records of each class that are no reference.
+
+    The classes of the data set stand first, in their order.
+    """
+    label, is_example = data.column("label_name"), ~data.is_reference
+    names = dict.fromkeys([*data.class_names, *np.unique(label[is_example]).tolist()])
+    return {name: is_example & (label == name) for name in names}
 
 
 def running_facts(data: Dataset) -> dict[str, object]:
