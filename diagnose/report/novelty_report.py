@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from diagnose.report.text import shown
-from diagnose.scoring.alarm_threshold import FALSE_ALARMS
-from diagnose.scoring.judged import drawn_text, interval_text
+from diagnose.scoring.alarms import FALSE_ALARMS
+from diagnose.scoring.intervals import drawn_text, interval_text
 from diagnose.studies.novelty import SCORE_LABELS
 from diagnose.studies.novelty_metrics import TRUE_POSITIVES
 from diagnose.studies.result_files import Content

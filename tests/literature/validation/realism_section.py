@@ -10,6 +10,7 @@ from benchmarks._realism_results import RECORDING, RESULTS, read_results
 from gensig.report.realism import (
     APART,
     MISSES,
+    OVERLAPS,
     Comparison,
     number_text,
     shown_range,
@@ -59,11 +60,14 @@ def realism_lines(path: Path = RESULTS) -> list[str]:
 
 
 def _part(title: str, text: str, figure: str, rows: Sequence[Comparison]) -> list[str]:
-    """One table of the section with its figure."""
+    """One table of the section with its figure; rows that overlap are counted."""
     if not rows:
         return []
     picture = f"![{title}: simulated beside measured](../figures/realism_{figure}.png)"
-    return ["", f"### {title}", "", *_filled(text), "", picture, "", *_table(rows)]
+    told = [row for row in rows if row.verdict != OVERLAPS]
+    count = f"{len(rows) - len(told)} of {len(rows)} rows overlap; the others:"
+    head = ["", f"### {title}", "", *_filled(text), "", picture, ""]
+    return [*head, count, "", *_table(told)]
 
 
 def _table(rows: Sequence[Comparison]) -> list[str]:

@@ -13,6 +13,7 @@ from dataset_samples import (
     setting,
     write_shard,
 )
+from refusals import refused
 
 from gensig.dataset.folder.inspection import inspect
 from gensig.dataset.folder.layout import shard_path
@@ -145,10 +146,10 @@ def test_a_folder_of_data_sets_names_them(tmp_path, plan):
     (runs / "notes").mkdir()
     (runs / "linked").symlink_to(tmp_path / "runs" / "a")
     for read in (verify, inspect):
-        with pytest.raises(DatasetError) as refused:
+        with pytest.raises(DatasetError) as caught:
             read(runs)
         advice = f"it holds 2 data sets, give one: {runs / 'a'}, {runs / 'b'}"
-        assert str(refused.value).endswith(advice)
+        assert str(caught.value).endswith(advice)
     for number in range(5):
         (runs / f"c{number}").mkdir()
         (runs / f"c{number}" / "manifest.json").touch()
@@ -157,12 +158,12 @@ def test_a_folder_of_data_sets_names_them(tmp_path, plan):
 
 
 def test_folder_that_is_no_data_set(tmp_path):
-    with pytest.raises(DatasetError, match="no gensig data set"):
+    with refused("no gensig data set", DatasetError):
         verify(tmp_path)
-    with pytest.raises(DatasetError, match="none does not exist"):
+    with refused("none does not exist", DatasetError):
         verify(tmp_path / "none")
     os.mkfifo(tmp_path / "manifest.json")  # must not hang
-    with pytest.raises(DatasetError, match="is no ordinary file"):
+    with refused("is no ordinary file", DatasetError):
         verify(tmp_path)
 
 
