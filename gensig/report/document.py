@@ -178,8 +178,8 @@ def _content(
     """Data that the script of the page draws."""
     along = [name for name in ALONG if name in data.column_names]
     table = value_table(data, measured.records, along)
-    for name, values in measured.values.items():
-        table["columns"][name] = pack_floats(values)
+    for name, _ in INDICATORS:
+        table["columns"][name] = pack_floats(measured.values[name])
     channels = zip(chosen.channels, units, strict=True)
     examples = signal_views(data, chosen, rotation)
     first = first_channel(chosen.channels)
