@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
 
 from gensig.dataset.cards.card import caveats_of
 from gensig.dataset.cards.facts import (
+    channel_units,
     class_examples,
     geometry_facts,
     rounded,
@@ -41,13 +41,6 @@ IN_WORDS = {
 }
 
 
-def channel_units(data: Dataset) -> list[str]:
-    """Unit of each channel, m/s^2 where the data set does not say."""
-    units = data.attributes.get("channel_units", [])
-    pairs = zip_longest(data.channel_names, units, fillvalue="m/s^2")
-    return [str(unit) for _, unit in pairs][: len(data.channel_names)]
-
-
 def contents(data: Dataset) -> list[Section]:
     """Facts of the data set, and its classes."""
     n_failed = int(np.count_nonzero(~data.usable))
@@ -58,8 +51,9 @@ def contents(data: Dataset) -> list[Section]:
         records += f", of which {n_failed} failed and are left out here"
     duration = data.n_samples / data.sampling_rate
     sampling = f"{data.n_samples} samples at {data.sampling_rate:g} Hz"
-    channels = zip(data.channel_names, channel_units(data), strict=True)
-    units = [f"{plain(name)} ({plain(unit)})" for name, unit in channels]
+    units = [
+        f"{plain(name)} ({plain(unit)})" for name, unit in channel_units(data).items()
+    ]
     further = [name for name in data.signal_names if name != "acceleration"]
     rows = [
         ("records", records),
@@ -237,7 +231,7 @@ def loading(data: Dataset) -> list[Section]:
     """Code that reads this set, and its caveats."""
     faulty = [name for name in data.class_names if name != "healthy"]
     name = [*faulty, *data.class_names][0]
-    units = ", ".join(dict.fromkeys(channel_units(data)))
+    units = ", ".join(dict.fromkeys(channel_units(data).values()))
     protocols = data.protocols
     code = [
         "import gensig",

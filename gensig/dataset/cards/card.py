@@ -9,6 +9,7 @@ import yaml
 from gensig.dataset.cards.class_figures import write_class_figures
 from gensig.dataset.cards.croissant import croissant_text
 from gensig.dataset.cards.facts import (
+    channel_units,
     class_examples,
     geometry_facts,
     running_facts,
@@ -170,8 +171,7 @@ def yaml_block(content: Mapping[str, object]) -> str:
 
 def set_facts(data: Dataset) -> list[tuple[object, ...]]:
     """Rows of fact and value on all records of a data set."""
-    units = data.attributes.get("channel_units", ["m/s^2"] * len(data.channel_names))
-    pairs = zip(data.channel_names, units, strict=False)
+    units = channel_units(data).items()
     n_reference = int(np.count_nonzero(data.is_reference))
     records, n_failed = str(data.n_records), int(np.count_nonzero(~data.usable))
     if n_reference:
@@ -186,7 +186,7 @@ def set_facts(data: Dataset) -> list[tuple[object, ...]]:
         "records": records,
         "duration of a record": f"{seconds:g} s ({data.n_samples} samples)",
         "sampling rate": f"{data.sampling_rate:g} Hz",
-        "channels": ", ".join(f"{name} ({unit})" for name, unit in pairs),
+        "channels": ", ".join(f"{name} ({unit})" for name, unit in units),
     }
     facts |= geometry_facts(data) | running_facts(data)
     if data.sample_type == "int16":

@@ -23,6 +23,13 @@ def n_designs(data: Dataset) -> int:
     return len(np.unique(designs, axis=0))
 
 
+def channel_units(data: Dataset) -> dict[str, str]:
+    """Unit of each channel by its name, m/s^2 where the data set does not say."""
+    names = data.channel_names
+    told = zip(names, map(str, data.attributes.get("channel_units", [])), strict=False)
+    return {**dict.fromkeys(names, "m/s^2"), **dict(told)}
+
+
 def gear_turns(data: Dataset) -> dict[str, float]:
     """Turns of the driving shaft during one turn of each gear of a drive line; {} for a pair."""
     names = data.attributes.get(GEAR_NAMES, [])
