@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from benchmarks._realism_recording import INDICATORS
 from benchmarks._realism_sets import CONTROLS
-from gensig.commands.figures.style import FAULTY, GREY, SOUND
+from gensig.commands.figures.panels import FAULTY, GREY, SOUND
 from gensig.report.realism import Comparison, points
 
 FloatArray = NDArray[np.floating]

@@ -12,7 +12,6 @@ import numpy as np
 from diagnose.data.lives import Lives
 from diagnose.data.protocols import MEANING
 from diagnose.report.base import Report
-from diagnose.report.markdown import table_lines
 from diagnose.report.panels import COLORS, panels, save, spaced
 from diagnose.report.text import (
     FEW_UNITS,
@@ -30,6 +29,7 @@ from diagnose.scoring.life_scores import BAND, MEASURES
 from diagnose.scoring.predictions import Prediction, hours_of
 from diagnose.studies.life_jobs import AGE_ONLY, AND_AGE, CONSTANT
 from diagnose.studies.result_files import Content, write_rows
+from gensig.text.markdown import table_lines
 from gensig.text.page import Card, Section, Table
 
 MOST_LINES = 12  # lives in one panel; more cannot be told apart

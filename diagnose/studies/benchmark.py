@@ -23,6 +23,7 @@ from diagnose.studies.result_files import Content, Entry, sha256
 from gensig.dataset.folder.layout import PLAN, SPLITS
 from gensig.errors import ConfigError, DatasetError
 from gensig.text.csv_tables import read_rows
+from gensig.text.markdown import table_lines
 from gensig.text.user_file import open_table
 
 if TYPE_CHECKING:
@@ -243,7 +244,7 @@ def _rows(path: Path) -> list[dict[str, str]]:
 
 def score_table(result: Content) -> list[str]:
     """Markdown table: a row for each protocol and method, those of the benchmark marked."""
-    lines = ["| protocol | method | balanced accuracy | chance |", "|---|---|---|---|"]
+    cells = []
     shipped = (result["benchmark"] or {"results": {}})["results"]
     for protocol, methods in result["scores"].items():
         rows = {name: score["balanced_accuracy"] for name, score in methods.items()}
@@ -251,6 +252,5 @@ def score_table(result: Content) -> list[str]:
             rows[f"{name} (shipped)"] = score
         chance = f"{result['chance'][protocol]:.3f}"
         for name, score in rows.items():
-            text = interval_text(score, ".3f")
-            lines.append(f"| {protocol} | {name} | {text} | {chance} |")
-    return lines
+            cells.append((protocol, name, interval_text(score, ".3f"), chance))
+    return table_lines(("protocol", "method", "balanced accuracy", "chance"), cells)

@@ -212,7 +212,6 @@ def _run_baselines(task: Task, settings: TrainSettings, job: Job) -> list[Predic
             task=task,
             protocol=protocol,
             features=settings.features,
-            minirocket_features=settings.minirocket_features,
             windows=partial(_windows, task, protocol),
             caches=caches,
         )

@@ -1,4 +1,4 @@
-"""Files that the verbs write: numbers as JSON, a figure, an option of a group.
+"""Answers of the verbs on one machine: numbers as JSON, a figure, an option, a summary.
 
 Names are checked before anything is computed. Options and records are replaced with ``--force``
 only. JSON files and figures are replaced.
@@ -6,18 +6,23 @@ only. JSON files and figures are replaced.
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 from argparse import Namespace
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.commands.console import replaced_file
+from gensig.commands.figures.panels import Figure, draw
+from gensig.commands.request import read_configuration
 from gensig.errors import ConfigError
+from gensig.options.configuration import Configuration
 from gensig.terminal.printing import show
 
 FIGURE_TYPES = (".png", ".svg", ".pdf")
@@ -36,12 +41,6 @@ def check_file(flag: str, name: str | None, types: tuple[str, ...] = ()) -> None
         )
     if path.is_dir():
         raise ConfigError(f"{flag} {name} is a folder; give the name of a file")
-
-
-def check_outputs(arguments: Namespace) -> None:
-    """Raise ConfigError for a ``--json`` or ``--plot`` that cannot be written."""
-    check_file("--json", arguments.json)
-    check_file("--plot", arguments.plot, FIGURE_TYPES)
 
 
 def check_new(flag: str, name: str | None, *, force: bool) -> None:
@@ -76,17 +75,61 @@ def write_option(target: Path, text: str) -> None:
     show(f"{target}: take it with {group}={target.stem} --config-dir {folder}")
 
 
-def write_outputs(
-    arguments: Namespace, content: Mapping[str, Any], draw: Callable[[Path], None]
-) -> None:
-    """Write ``content`` to ``--json``, and let ``draw`` write the figure of ``--plot``."""
-    if arguments.json is not None:
-        with replaced_file(arguments.json) as path:
-            text = json.dumps(plain(content), indent=1, allow_nan=False)
-            path.write_text(text + "\n", encoding="utf-8")
-    if arguments.plot is not None:
-        with replaced_file(arguments.plot) as path:
-            draw(path)
+@dataclass(frozen=True, slots=True, eq=False)
+class Answer:
+    """Result of a verb on one machine.
+
+    Attributes
+    ----------
+    content : of ``--json``
+    lines : of the summary
+    figure : makes the figure of ``--plot``
+    option : makes the text of the option of ``--out``
+    """
+
+    content: Mapping[str, Any]
+    lines: Iterable[str]
+    figure: Callable[[], Figure]
+    option: Callable[[], str] | None = None
+
+
+Question: TypeAlias = Callable[[Configuration, Namespace], Answer | int]
+
+
+def answered(
+    question: Question | None = None, *, group: str | None = None
+) -> Callable[..., Any]:
+    """The verb that writes and prints the answer to a question on a configuration.
+
+    Names of files are checked before anything is computed. A question without an answer gives an
+    exit status. ``group`` is that of the option of ``--out``.
+    """
+    if question is None:
+        return functools.partial(answered, group=group)
+
+    @functools.wraps(question)
+    def verb(arguments: Namespace) -> int:
+        check_file("--json", arguments.json)
+        check_file("--plot", arguments.plot, FIGURE_TYPES)
+        target = None
+        if group is not None and arguments.out is not None:
+            target = option_file(arguments.out, group, force=arguments.force)
+        answer = question(read_configuration(arguments), arguments)
+        if isinstance(answer, int):
+            return answer
+        if arguments.json is not None:
+            text = json.dumps(plain(answer.content), indent=1, allow_nan=False)
+            with replaced_file(arguments.json) as path:
+                path.write_text(text + "\n", encoding="utf-8")
+        if arguments.plot is not None:
+            with replaced_file(arguments.plot) as path:
+                draw(answer.figure(), path)
+        show(*answer.lines)
+        if target is not None and answer.option is not None:
+            write_option(target, answer.option())
+        return 0
+
+    return verb
 
 
 def plain(value: Any) -> Any:

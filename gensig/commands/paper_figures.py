@@ -21,7 +21,8 @@ def figures(arguments: Namespace) -> int:
     ------
     ConfigError    for an unknown paper or figure
     """
-    from gensig.commands.figures.paper_drawing import draw_paper_figure
+    from gensig.commands.figures.panels import draw
+    from gensig.commands.figures.paper_drawing import paper_page
     from gensig.papers.registry import PAPERS
 
     if arguments.paper not in PAPERS:
@@ -51,7 +52,7 @@ def figures(arguments: Namespace) -> int:
         ):
             figure.write_csv(file)
         with replaced_file(stem.with_suffix(".png")) as path:
-            draw_paper_figure(figure, path)
+            draw(paper_page(figure), path)
         show(f"{stem}.png and .csv: {figure.title}")
         show_text(textwrap.indent(textwrap.fill(figure.reason, WIDTH), "    "))
     return 0

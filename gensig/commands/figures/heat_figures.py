@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import itertools
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from gensig.commands.figures.style import (
+from gensig.commands.figures.panels import (
     COLORS,
     FIRST_SLICE,
     GREY,
     MESH_PERIODS,
     STIFFNESS,
+    Figure,
+    Panel,
+    across,
     curve,
-    panels,
-    save,
-    titles,
+    upright,
 )
-from gensig.commands.gears.heat_report import NAMES, HeatReport
+from gensig.commands.gears.heat_report import NAMES, HeatReport, bodies
 from gensig.systems.hot_pair import (
     APPARENT,
     COLD,
@@ -37,12 +36,8 @@ STYLES = {COLD: "--", PAPER_COLD: ":", PAPER: "-.", PAPER_HOUSED: "-."}
 NOT_DRAWN = (PAPER_SUMS, PAPER_COLD_SUMS)
 
 
-def plot_heat(report: HeatReport, path: Path) -> None:
-    """Draw bulk field, flash temperature, and stiffness of pair and mesh with every effect."""
-    figure, axes = panels(2, 2, 11, 7.6)
-    (bulk, flash), (pair, mesh) = axes
-    _bulk(bulk, report)
-    _flash(flash, report)
+def heat_figure(report: HeatReport) -> Figure:
+    """Bulk field, flash temperature, and stiffness of pair and mesh with every effect."""
     title = "Mesh"
     drawn = {
         name: variant
@@ -57,54 +52,64 @@ def plot_heat(report: HeatReport, path: Path) -> None:
         else:
             title += f" (apparent, mean {apparent.mesh.mean() / 1e9:.3g}: beyond)"
     colors = itertools.cycle((GREY, *COLORS))
+    pair, mesh = [], []
     for color, (name, variant) in zip(colors, drawn.items(), strict=False):
-        style = STYLES.get(name, "-")
-        single = variant.single / 1e9
-        curve(pair, variant.position, single, color, NAMES[name], style=style)
+        look = NAMES[name], color, STYLES.get(name, "-")
+        pair.append(curve(variant.position, variant.single / 1e9, *look))
         n_phases = len(variant.mesh)
         periods, twice = np.arange(2 * n_phases) / n_phases, np.tile(variant.mesh, 2)
-        curve(mesh, periods, twice / 1e9, color, NAMES[name], style=style)
-    titles(pair, "One pair, slices on the path", FIRST_SLICE, STIFFNESS)
-    titles(mesh, title, MESH_PERIODS, STIFFNESS)
-    pair.legend(loc="lower center")
+        mesh.append(curve(periods, twice / 1e9, *look))
+    stiffness = [
+        Panel(
+            "One pair, slices on the path",
+            FIRST_SLICE,
+            STIFFNESS,
+            pair,
+            legend="lower center",
+        ),
+        Panel(title, MESH_PERIODS, STIFFNESS, mesh, legend=None),
+    ]
     duty, rpm = report.duty, report.duty.speed * 30.0 / np.pi
-    figure.suptitle(
+    return Figure(
+        [[_bulk(report), _flash(report)], stiffness],
+        (11, 7.6),
         f"{duty.system.torque / 1e3:.4g} kN m at {rpm:.4g} r/min, "
         f"friction {duty.friction:g}: "
-        f"{report.state.friction_heat / 1e3:.3g} kW of friction heat"
+        f"{report.state.friction_heat / 1e3:.3g} kW of friction heat",
     )
-    save(figure, path)
 
 
-def _bulk(axes: Any, report: HeatReport) -> None:
-    state, heat = report.state, report.duty.heat
-    bodies = {"pinion": state.pinion, "wheel": state.wheel}
-    for color, (name, body) in zip(COLORS, bodies.items(), strict=False):
+def _bulk(report: HeatReport) -> Panel:
+    marks, heat = [], report.duty.heat
+    for name, body in bodies(report.state).items():
         bore, root = body.radius[0], body.radius[-1]
         share = (body.radius - bore) / (root - bore)
         label = f"{name}, bore radius {bore * 1e3:.4g}, root {root * 1e3:.4g} mm"
-        curve(axes, share, body.temperature, color, label)
-    axes.axhline(heat.oil_temperature, color=GREY, linestyle=":", label="oil")
-    axes.axhline(heat.housing_temperature, color=GREY, linestyle="--", label="housing")
-    titles(
-        axes,
+        marks.append(curve(share, body.temperature, label))
+    marks += [
+        across(heat.oil_temperature, linewidth=1.5, linestyle=":", label="oil"),
+        across(
+            heat.housing_temperature, linewidth=1.5, linestyle="--", label="housing"
+        ),
+    ]
+    return Panel(
         "Bulk temperature; the teeth have that of the root",
         "share of the way from the bore to the root circle",
         "degrees Celsius",
+        marks,
     )
-    axes.legend(fontsize="small")
 
 
-def _flash(axes: Any, report: HeatReport) -> None:
+def _flash(report: HeatReport) -> Panel:
     pair, state = report.duty.system.pair, report.state
-    curve(axes, state.flash_position / pair.base_pitch, state.flash, COLORS[0])
     pitch_point = pair.pitch_point / pair.base_pitch
-    axes.axvline(pitch_point, color=GREY, linestyle=":", label="pitch point")
-    titles(
-        axes,
+    return Panel(
         "Flash temperature under the slices' own loads",
         "contact position from the start of contact, base pitches",
         "K above the teeth",
+        [
+            curve(state.flash_position / pair.base_pitch, state.flash),
+            upright(pitch_point, linestyle=":", label="pitch point"),
+        ],
+        ylim=(0.0, None),
     )
-    axes.set_ylim(bottom=0.0)
-    axes.legend()

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from gensig.commands.figures.style import (
+from gensig.commands.figures.panels import (
+    COLORS,
     FAULTY,
     GREY,
-    SMALL,
     SOUND,
     THIRD,
+    Figure,
+    Mark,
+    Panel,
+    across,
     curve,
-    panels,
-    save,
-    titles,
 )
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth_profile import tooth_profile
@@ -32,49 +31,53 @@ from gensig.life.root.tooth_root import (
 from gensig.systems.root_strength import GearStress, RootHistory, RootStrength
 
 
-def plot_root_stress(
-    system: RootStrength, gears: dict[str, GearStress], history: RootHistory, path: Path
-) -> None:
-    """Draw root stress of both gears over the mesh, and the tooth of the decisive gear."""
-    figure, axes = panels(1, 2, 11, 4.8)
-    _stress(axes[0, 0], system, gears, history)
-    _tooth(axes[0, 1], system, gears[system.decisive])
+def root_stress_figure(
+    system: RootStrength, gears: dict[str, GearStress], history: RootHistory
+) -> Figure:
+    """Root stress of both gears over the mesh, and the tooth of the decisive gear."""
+    stress, tooth = _stress(system, gears, history), _tooth(system, gears)
     pair = system.pair
     helix = abs(math.degrees(pair.pinion.helix_angle))
-    figure.suptitle(
+    return Figure(
+        [[stress, tooth]],
+        (11, 4.8),
         f"{pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth, helix {helix:g} deg, "
         f"{system.flanks.torque:.5g} N m, "
-        f"tangential force {system.tangential_force:.5g} N"
+        f"tangential force {system.tangential_force:.5g} N",
     )
-    save(figure, path)
 
 
 def _stress(
-    axes: Any, system: RootStrength, gears: dict[str, GearStress], history: RootHistory
-) -> None:
+    system: RootStrength, gears: dict[str, GearStress], history: RootHistory
+) -> Panel:
     """Stress of both gears, that of ISO 6336-3, and the load share of the pair."""
     roll = np.degrees(history.roll / system.pair.pinion.base_radius)
-    highest = 0.0
-    for (name, values), color in zip(
-        history.stress.items(), (SOUND, FAULTY), strict=True
-    ):
-        iso = gears[name].stress * 1e-6
-        curve(axes, roll, values * 1e-6, color, f"{name}, through the mesh")
+    highest, marks = 0.0, []
+    for (name, values), color in zip(history.stress.items(), COLORS, strict=False):
+        iso = gears[name].stress
         look = {"color": color, "linestyle": "--", "linewidth": 1.0}
-        axes.axhline(iso, label=f"{name}, ISO 6336-3", **look)
-        highest = max(highest, values.max(), gears[name].stress)
-    abscissa = "roll of the pinion since contact begins, deg"
-    titles(axes, "Root stress of one tooth pair", abscissa, "MPa")
-    axes.set_ylim(0.0, 1.45e-6 * highest)  # room for the legend
-    share = axes.twinx()
+        marks += [
+            curve(roll, values * 1e-6, f"{name}, through the mesh", color),
+            across(iso * 1e-6, label=f"{name}, ISO 6336-3", **look),
+        ]
+        highest = max(highest, values.max(), iso)
     label = "load share of the pair"
-    curve(share, roll, history.share, GREY, label, style=":")
-    share.set(ylabel="share of the load", ylim=(0.0, 1.45))
-    lines = [*axes.get_lines(), *share.get_lines()]
-    axes.legend(handles=lines, loc="upper center", ncols=2, fontsize=SMALL)
+    share = curve(roll, history.share, label, GREY, ":")
+    return Panel(
+        "Root stress of one tooth pair",
+        "roll of the pinion since contact begins, deg",
+        "MPa",
+        marks,
+        legend="upper center",
+        columns=2,
+        ylim=(0.0, 1.45e-6 * highest),  # room for the legend
+        second=Panel(
+            "", "", "share of the load", [share], legend=None, ylim=(0.0, 1.45)
+        ),
+    )
 
 
-def _tooth(axes: Any, system: RootStrength, stress: GearStress) -> None:
+def _tooth(system: RootStrength, gears: dict[str, GearStress]) -> Panel:
     """Outline in the normal section with the 30 degree tangents, the load and its lever arm.
 
     Millimetres from the centerline and above the root circle.
@@ -87,12 +90,16 @@ def _tooth(axes: Any, system: RootStrength, stress: GearStress) -> None:
     y, x = (outline.abscissa - scale - floor) * 1e3, outline.half_thickness * 1e3
     half, height = 0.5e3 * section.thickness, (section.height - floor) * 1e3
     reach = half / math.tan(TANGENT)
-    for side, label in ((-1.0, None), (1.0, "tangents at 30 deg")):
-        curve(axes, side * x, y, "black", width=1.5)
-        tangent = [height - 0.25 * reach, height + reach]
-        curve(axes, [side * half * 1.25, 0.0], tangent, THIRD, label, width=1.0)
     label = f"critical section, {2.0 * half:.3g} mm"
-    curve(axes, [-half, half], [height, height], FAULTY, label)
+    tangent = [height - 0.25 * reach, height + reach]
+    marks: list[Mark] = []
+    for side, name in ((-1.0, None), (1.0, "tangents at 30 deg")):
+        sloped = [side * half * 1.25, 0.0]
+        marks += [
+            curve(side * x, y, None, "black", width=1.5),
+            curve(sloped, tangent, name, THIRD, width=1.0),
+        ]
+    marks.append(curve([-half, half], [height, height], label, FAULTY))
     load_height = 0.0
     if system.strength.load_point != "tip":
         pitch = math.pi * real.normal_module * math.cos(real.pressure_angle)
@@ -100,22 +107,23 @@ def _tooth(axes: Any, system: RootStrength, stress: GearStress) -> None:
     loading = root_loading(real, load_height, allow_extrapolation=True)
     top = height + float(loading.lever_arm[0]) * 1e3
     slope = math.tan(float(loading.load_angle[0]))
-    axes.annotate(
-        "",
-        xy=(0.0, top),
-        xytext=(1.6 * half, top + 1.6 * half * slope),
-        arrowprops={"arrowstyle": "->", "color": SOUND, "linewidth": 1.8},
-    )
+    ends = {"xy": (0.0, top), "xytext": (1.6 * half, top + 1.6 * half * slope)}
+    look = {"arrowstyle": "->", "color": SOUND, "linewidth": 1.8}
+    marks.append(Mark("annotate", ("",), {**ends, "arrowprops": look}))
     label = f"lever arm, {top - height:.3g} mm"
-    curve(axes, [0.0, 0.0], [height, top], GREY, label, style="--")
-    factors, safety = stress.factors, stress.safety
-    title = (
+    marks.append(curve([0.0, 0.0], [height, top], label, GREY, "--"))
+    factors = gears[system.decisive].factors
+    safety = gears[system.decisive].safety
+    return Panel(
         f"Tooth of the {system.decisive}: Y_F {factors.form_factor:.3f}, "
         f"Y_S {factors.stress_correction_factor:.3f}\n"
-        f"safety {safety.paper:.2f} (paper), {safety.iso:.2f} (ISO 6336-3)"
+        f"safety {safety.paper:.2f} (paper), {safety.iso:.2f} (ISO 6336-3)",
+        "mm",
+        "mm above the root",
+        marks,
+        legend="lower center",
+        aspect="equal",
     )
-    titles(axes, title, "mm", "mm above the root", aspect="equal")
-    axes.legend(loc="lower center", fontsize=SMALL)
 
 
 def _spur(gear: Gear) -> Gear:

@@ -6,25 +6,32 @@ from typing import Any
 
 import numpy as np
 
-from gensig.commands.figures.motor_figures import natural_hz, node_name, turner
-from gensig.commands.figures.style import (
+from gensig.commands.figures.panels import (
     ANGLE_AMPLITUDE,
     COLORS,
     FAULTY,
     FREQUENCY,
     GREY,
-    SMALL,
     SOUND,
     WITH_MODES,
+    Mark,
+    Panel,
+    across,
     band,
+    bars,
     curve,
-    mark_modes,
-    mark_orders,
-    titles,
+    modes_across,
+    upright,
     waterfall,
-    zero_line,
 )
-from gensig.commands.lines.results import RPM, ResponseResult, roll_degrees
+from gensig.commands.lines.results import (
+    RPM,
+    ResponseResult,
+    natural_hz,
+    node_name,
+    roll_degrees,
+    turner,
+)
 from gensig.driveline.engine_dampers import passes_of_a_cycle
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.cycle import CYCLE
@@ -48,93 +55,109 @@ ROOT_LOOKS = {
 
 
 def time_rows(
-    axes: Any, line: EngineLine, result: ResponseResult, response: TimeResponse
-) -> None:
-    """Draw speeds, spectra, loads of all meshes and the force of one, (2, 2) axes."""
-    _speeds(axes[0, 0], line, result, response)
-    _spectra(axes[0, 1], line, result, response)
+    line: EngineLine, result: ResponseResult, response: TimeResponse
+) -> list[list[Panel | None]]:
+    """Speeds and spectra, loads of all meshes and the force of one."""
     mean, amplitudes = result.response.element_forces(line.linear()[1])
     linear = mean[:, None] + over_cycle(amplitudes, CYCLE_POINTS)
-    _loads(axes[1, 0], line, linear, response)
     mesh = result.mesh
     if mesh is None:
         mesh = int(linear.max(axis=1).argmax())
-    _force(axes[1, 1], line, mesh, linear[mesh], response)
+    return [
+        [_speeds(line, result, response), _spectra(line, result, response)],
+        [_loads(line, linear, response), _force(line, mesh, linear[mesh], response)],
+    ]
 
 
-def root_row(axes: Any, line: EngineLine, result: ResponseResult) -> None:
-    """Draw root stress over the roll, and the largest of each pair of a cycle, (2,) axes."""
+def root_row(line: EngineLine, result: ResponseResult) -> list[Panel | None]:
+    """Root stress over the roll, and the largest of each pair of a cycle."""
     assert result.mesh is not None
-    over_roll, over_pairs = axes
+    over_roll, over_pairs = [], []
     in_cycle = passes_of_a_cycle(line, result.mesh)
     for name, root in result.roots.items():
-        color, style = ROOT_LOOKS[name]
-        label = name.replace("_", " ")
+        look = name.replace("_", " "), *ROOT_LOOKS[name]
         passes = root.passes[root.strength.decisive] * 1e-6
         largest = passes.max(axis=1)
         heaviest = passes[int(largest.argmax())]
-        curve(over_roll, roll_degrees(root), heaviest, color, label, style=style)
+        over_roll.append(curve(roll_degrees(root), heaviest, *look))
         whole = len(largest) // in_cycle
         by_pair = largest[: whole * in_cycle].reshape(whole, in_cycle)
         pairs, median = range(in_cycle), np.median(by_pair, axis=0)
-        curve(over_pairs, pairs, median, color, label, style=style)
+        over_pairs.append(curve(pairs, median, *look))
         if whole > 1:
-            low, high = by_pair.min(axis=0), by_pair.max(axis=0)
-            band(over_pairs, pairs, low, high, color)
-    title = f"Root stress of the pair that bears most, {line.mesh_names[result.mesh]}"
-    titles(over_roll, title, "roll of the pinion, deg", "MPa")
-    title = "Largest of each pair: median of the cycles, range"
-    titles(over_pairs, title, "pair of the cycle", "MPa")
-    for panel in axes:
-        panel.set_ylim(0.0, None)
-        panel.margins(y=0.25)
-        panel.legend(fontsize=SMALL, loc="upper right")
+            ends = by_pair.min(axis=0), by_pair.max(axis=0)
+            over_pairs.append(band(pairs, *ends, ROOT_LOOKS[name][0]))
+    axes: Any = {"legend": "upper right", "margin": 0.25, "ylim": (0.0, None)}
+    bearing = f"Root stress of the pair that bears most, {line.mesh_names[result.mesh]}"
+    largest = "Largest of each pair: median of the cycles, range"
+    return [
+        Panel(bearing, "roll of the pinion, deg", "MPa", over_roll, **axes),
+        Panel(largest, "pair of the cycle", "MPa", over_pairs, **axes),
+    ]
 
 
 def sweep_rows(
-    figure: Any, axes: Any, line: EngineLine, result: ResponseResult, sweep: Sweep
-) -> None:
-    """Draw a sweep up, down and the difference at the first two nodes, (3, 2) axes."""
-    ways = {"up": sweep.up, "down": sweep.down}
+    line: EngineLine, result: ResponseResult, sweep: Sweep
+) -> list[list[Panel | None]]:
+    """A sweep up, down and the difference at the first two nodes."""
     speed = f"speed of the {turner(line)}, r/min"
+    ways = {"up": sweep.up, "down": sweep.down}
+    modes = natural_hz(line)
+    columns: list[list[Panel | None]] = []
     for column, node in enumerate(result.nodes[:2]):
         name = node_name(line, node)
         top = float(max(way.spectra[column].max() for way in ways.values()))
-        for panel, (word, way) in zip(axes[:2, column], ways.items(), strict=True):
-            _waterfall(figure, panel, way, column, top)
-            mark_modes(panel, natural_hz(line), way.frequencies[-1])
-            title = f"In time, {word}, {name}"
-            titles(panel, title, WITH_MODES, speed)
-        _both_ways(axes[2, column], result, sweep, column)
-        title = f"Speed fluctuation in a cycle, {name}"
-        titles(axes[2, column], title, speed, "plus or minus, r/min")
-    for panel in axes[:, len(result.nodes) :].flat:
-        panel.set_axis_off()
+        maps = [
+            Panel(
+                f"In time, {word}, {name}",
+                WITH_MODES,
+                speed,
+                [
+                    *_way_map(way, column, top),
+                    *modes_across(modes, way.frequencies[-1]),
+                ],
+                above=modes,
+            )
+            for word, way in ways.items()
+        ]
+        difference = Panel(
+            f"Speed fluctuation in a cycle, {name}",
+            speed,
+            "plus or minus, r/min",
+            _both_ways(result, sweep, column),
+            ylim=(0.0, None),
+        )
+        columns.append([*maps, difference])
+    if len(columns) == 1:
+        columns.append([None] * 3)
+    return [list(row) for row in zip(*columns, strict=True)]
 
 
-def _speeds(
-    axes: Any, line: EngineLine, result: ResponseResult, response: TimeResponse
-) -> None:
+def _speeds(line: EngineLine, result: ResponseResult, response: TimeResponse) -> Panel:
     angle = np.degrees(response.crank_angle)
     shown = angle < TRACE_CYCLES * 720.0
     linear = RPM * result.response.speed_over_cycle(SPEED_POINTS)
     n_points = SPEED_POINTS * TRACE_CYCLES
     cycle = np.linspace(0.0, 720.0 * TRACE_CYCLES, n_points, endpoint=False)
-    nodes = zip(result.nodes, response.speed, COLORS, strict=False)
-    for node, speed, color in nodes:
+    marks: list[Mark] = []
+    for node, speed, color in zip(result.nodes, response.speed, COLORS, strict=False):
         repeated = np.tile(linear[line.drive.numbers.index(node)], TRACE_CYCLES)
-        curve(axes, cycle, repeated, color, style=":", width=0.7)
         name = node_name(line, node)
-        curve(axes, angle[shown], RPM * speed[shown], color, name, width=0.9)
-    title = "Speed less its mean, in time (dotted: linear)"
-    titles(axes, title, f"angle of the {turner(line)}, degrees", "r/min")
-    axes.margins(y=0.25)
-    axes.legend(fontsize=SMALL, loc="upper right")
+        marks += [
+            curve(cycle, repeated, None, color, ":", 0.7),
+            curve(angle[shown], RPM * speed[shown], name, color, width=0.9),
+        ]
+    return Panel(
+        "Speed less its mean, in time (dotted: linear)",
+        f"angle of the {turner(line)}, degrees",
+        "r/min",
+        marks,
+        legend="upper right",
+        margin=0.25,
+    )
 
 
-def _spectra(
-    axes: Any, line: EngineLine, result: ResponseResult, response: TimeResponse
-) -> None:
+def _spectra(line: EngineLine, result: ResponseResult, response: TimeResponse) -> Panel:
     """Angular displacement by frequency.
 
     Grey lines mark the half orders of an engine, or the mesh frequencies of a motor's line.
@@ -150,20 +173,28 @@ def _spectra(
         marked = "dotted: half orders"
     frequencies, spectra = amplitude_spectra(response.angle, highest)
     shown = frequencies <= highest
-    for order in orders[orders * rate < highest]:
-        style = ":" if order % 1.0 else "-"
-        axes.axvline(order * rate, color=GREY, linewidth=0.3, linestyle=style)
-    for node, spectrum, color in zip(result.nodes, spectra, COLORS, strict=False):
-        amplitude = np.degrees(spectrum[shown])
-        name = node_name(line, node)
-        curve(axes, frequencies[shown], amplitude, color, name, width=0.8)
-    title = f"Angular displacement in time ({marked})"
-    titles(axes, title, FREQUENCY, ANGLE_AMPLITUDE, yscale="log", xlim=(0.0, highest))
-    axes.set_ylim(None, 10.0 * np.degrees(spectra[:, shown].max()))
-    axes.legend(fontsize=SMALL, loc="upper right")
+    amplitudes = np.degrees(spectra[:, shown])
+    marks = [
+        upright(order * rate, linewidth=0.3, linestyle=":" if order % 1.0 else "-")
+        for order in orders[orders * rate < highest]
+    ]
+    marks += [
+        curve(frequencies[shown], amplitude, node_name(line, node), width=0.8)
+        for node, amplitude in zip(result.nodes, amplitudes, strict=False)
+    ]
+    return Panel(
+        f"Angular displacement in time ({marked})",
+        FREQUENCY,
+        ANGLE_AMPLITUDE,
+        marks,
+        legend="upper right",
+        log="y",
+        xlim=(0.0, highest),
+        ylim=(None, 10.0 * amplitudes.max()),
+    )
 
 
-def _loads(axes: Any, line: EngineLine, linear: Any, response: TimeResponse) -> None:
+def _loads(line: EngineLine, linear: Any, response: TimeResponse) -> Panel:
     """Bars from the least to the greatest tooth force of each mesh."""
     least, greatest = typical_extremes(response.mesh_force, response.crank_angle)
     meshes = np.arange(len(least))
@@ -172,8 +203,8 @@ def _loads(axes: Any, line: EngineLine, linear: Any, response: TimeResponse) -> 
         ("linear", low, high, SOUND, -0.2),
         ("in time, a cycle's", least, greatest, FAULTY, 0.2),
     )
-    for label, bottom, top, color, shift in ranges:
-        axes.bar(
+    marks = [
+        bars(
             meshes + shift,
             (top - bottom) / 1e3,
             bottom=bottom / 1e3,
@@ -181,57 +212,67 @@ def _loads(axes: Any, line: EngineLine, linear: Any, response: TimeResponse) -> 
             color=color,
             label=label,
         )
-    axes.plot(meshes, linear.mean(axis=1) / 1e3, "k_", markersize=18, label="mean")
-    zero_line(axes)
+        for label, bottom, top, color, shift in ranges
+    ]
+    mean = linear.mean(axis=1) / 1e3
     names = zip(line.mesh_names, response.contact_loss, strict=True)
-    axes.set_xticks(meshes, [f"{name}\n{apart:.0%}" for name, apart in names])
-    title = "Tooth force of the meshes, least to greatest"
-    titles(axes, title, "mesh, share of time apart", "kN")
     bottom = min(least.min(), low.min(), 0.0)
     top = max(greatest.max(), high.max(), 0.0)
-    axes.set_ylim(1.1 * bottom / 1e3, 1.3 * top / 1e3)
-    axes.legend(fontsize=SMALL)
+    return Panel(
+        "Tooth force of the meshes, least to greatest",
+        "mesh, share of time apart",
+        "kN",
+        [*marks, curve(meshes, mean, "mean", "k", "_", markersize=18), across()],
+        ticks={
+            place: f"{name}\n{apart:.0%}" for place, (name, apart) in enumerate(names)
+        },
+        ylim=(1.1 * bottom / 1e3, 1.3 * top / 1e3),
+    )
 
 
-def _force(
-    axes: Any, line: EngineLine, mesh: int, linear: Any, response: TimeResponse
-) -> None:
+def _force(line: EngineLine, mesh: int, linear: Any, response: TimeResponse) -> Panel:
     """Tooth force of one mesh over the first cycles."""
     shown = response.crank_angle < TRACE_CYCLES * CYCLE
     n_points = TRACE_CYCLES * len(linear)
     cycle = np.linspace(0.0, 720.0 * TRACE_CYCLES, n_points, endpoint=False)
     angle = np.degrees(response.crank_angle[shown])
     force = response.mesh_force[mesh][shown] / 1e3
-    curve(axes, angle, force, FAULTY, "in time", width=0.7)
     repeated = np.tile(linear, TRACE_CYCLES) / 1e3
-    curve(axes, cycle, repeated, SOUND, "linear", width=0.9)
-    zero_line(axes)
-    title = f"Tooth force of mesh {line.mesh_names[mesh]}"
-    titles(axes, title, f"angle of the {turner(line)}, degrees", "kN")
-    axes.margins(y=0.2)
-    axes.legend(fontsize=SMALL, loc="upper right")
+    return Panel(
+        f"Tooth force of mesh {line.mesh_names[mesh]}",
+        f"angle of the {turner(line)}, degrees",
+        "kN",
+        [
+            curve(angle, force, "in time", FAULTY, width=0.7),
+            curve(cycle, repeated, "linear", SOUND, width=0.9),
+            across(),
+        ],
+        legend="upper right",
+        margin=0.2,
+    )
 
 
-def _waterfall(figure: Any, axes: Any, way: SweepWay, column: int, top: float) -> None:
+def _way_map(way: SweepWay, column: int, top: float) -> list[Mark]:
     """Angular displacement over frequency and speed; ``top``, rad, is the brightest."""
-    rpm = RPM * way.speeds
     level = np.log10(np.degrees(np.maximum(way.spectra[column], 1e-4 * top)))
     high = np.log10(np.degrees(top))
     ends = {"vmin": high - 4.0, "vmax": high}
-    waterfall(figure, axes, way.frequencies, rpm, level, **ends)
-    mark_orders(axes, MARKED_ORDERS, rpm, way.frequencies[-1], lines=True)
+    rpm = RPM * way.speeds
+    return waterfall(way.frequencies, rpm, level, MARKED_ORDERS, rays=True, **ends)
 
 
-def _both_ways(axes: Any, result: ResponseResult, sweep: Sweep, column: int) -> None:
+def _both_ways(result: ResponseResult, sweep: Sweep, column: int) -> list[Mark]:
     """Fluctuation up and down with three standard errors, and the linear one of a run."""
+    marks: list[Mark] = []
     for way, color, label in ((sweep.up, SOUND, "up"), (sweep.down, FAULTY, "down")):
         rpm, mean = RPM * way.speeds, RPM * way.fluctuation[column]
         error = 3.0 * (RPM * way.scatter[column])
-        curve(axes, rpm, mean, color, f"{label}, in {sweep.seconds:g} s")
-        band(axes, rpm, mean - error, mean + error, color)
+        marks += [
+            curve(rpm, mean, f"{label}, in {sweep.seconds:g} s", color),
+            band(rpm, mean - error, mean + error, color),
+        ]
     if result.run:
         run = result.run[column]
-        steady = RPM * run.fluctuation
-        curve(axes, RPM * run.speeds, steady, GREY, "linear, steady", width=0.9)
-    axes.set_ylim(0.0, None)
-    axes.legend(fontsize=SMALL)
+        rpm, steady = RPM * run.speeds, RPM * run.fluctuation
+        marks.append(curve(rpm, steady, "linear, steady", GREY, width=0.9))
+    return marks

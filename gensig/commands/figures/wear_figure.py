@@ -4,28 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gensig.commands.figures.style import (
+from gensig.commands.figures.panels import (
     COLORS,
     FAULTY,
     GREY,
-    SOUND,
     THIRD,
+    Figure,
+    Mark,
+    Panel,
+    across,
     curve,
-    panels,
-    save,
-    titles,
+    curves,
+    upright,
 )
 from gensig.life.life_laws import LifeMap
 from gensig.life.options import SIDES
 from gensig.life.wear.wear_life import WearLife
-
-Array = NDArray[np.float64]
 
 TALLEST = 1.6  # times the largest radius of new flanks; flatter and hollow points are left out
 POSITION = "position on the path of contact from A, mm (dotted: pitch point)"
@@ -37,77 +35,71 @@ ENDED_BY = {
 SHOWN = (10, 20, 30, 40)  # snapshots: quarters of the life
 
 
-def plot_wear_life(
-    life: WearLife,
-    speed: float,
-    content: Mapping[str, Any],
-    lives: LifeMap | None,
-    path: Path,
-) -> None:
-    """Draw six panels; the last is the map of lives where there is one, else the history."""
-    figure, axes = panels(2, 3, 15, 8)
-    position = np.array(content["position_mm"])
-    sliding, pressure, per_mesh, depth, radii, last = axes.flat
-    _sliding(sliding, position, content)
-    _pressure(pressure, position, content)
-    _per_mesh(per_mesh, position, content)
-    _depth(depth, position, life)
-    _radii(radii, position, content)
-    if lives is None:
-        _history(last, content)
-    else:
-        _map(figure, last, lives, content)
-    pair = life.case.pair
-    for panel in axes.flat[:5]:
-        panel.axvline(pair.pitch_point * 1e3, color=GREY, linewidth=0.6, linestyle=":")
-        panel.set_xlabel(POSITION)
-    figure.suptitle(
+def wear_life_figure(
+    life: WearLife, content: Mapping[str, Any], lives: LifeMap | None
+) -> Figure:
+    """Six panels; the last is the map of lives where there is one, else the history."""
+    position, pair = content["position_mm"], life.case.pair
+    pitch_point = upright(pair.pitch_point * 1e3, linewidth=0.6, linestyle=":")
+    last = _history(content)
+    if lives is not None:
+        last = _map(lives, content)
+
+    def along(title: str, unit: str, *marks: Mark, **look: Any) -> Panel:
+        return Panel(title, POSITION, unit, [*marks, pitch_point], **look)
+
+    sliding = curve(position, content["sliding_velocity_mm_per_s"])
+    new = curve(position, content["contact_pressure_mpa"], "new flanks")
+    label, worn = "at the end of the life", content["contact_pressure_at_end_mpa"]
+    end = curve(position, worn, label, style="--")
+    per_mesh = {name: content[f"{name}_wear_per_mesh_nm"] for name in SIDES}
+    radii, highest = _radii(content)
+    upper = [
+        along("Sliding, wheel's speed less pinion's", "mm/s", sliding, across()),
+        along("Largest contact pressure", "MPa", new, end, ylim=(0.0, None)),
+        along("Wear of a mesh, new flanks", "nm", *curves(position, per_mesh)),
+    ]
+    lower = [
+        along(
+            "Worn off at each quarter of the life",
+            "depth normal to the flank, um",
+            *_depth(position, life),
+            falls=True,
+        ),
+        along(
+            "Curvature radius (green: eq. 22 of the paper)",
+            "mm",
+            *radii,
+            ylim=(0.0, TALLEST * highest),
+        ),
+        last,
+    ]
+    return Figure(
+        [upper, lower],
+        (15, 8),
         f"{pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth, {life.case.torque:g} N m, "
         f"{content['speed_rpm']:g} r/min: {content['life_hours']:.4g} h "
         f"to {content['threshold_um']:.4g} um{ENDED_BY[content['ended_by']]} "
         f"(rule {content['rule']}, sharing {content['sharing']}, "
-        f"geometry {content['geometry']})"
+        f"geometry {content['geometry']})",
     )
-    save(figure, path)
 
 
-def _sliding(axes: Any, position: Array, content: Mapping[str, Any]) -> None:
-    curve(axes, position, content["sliding_velocity_mm_per_s"], SOUND)
-    axes.axhline(0.0, color=GREY, linewidth=0.6)
-    axes.set(title="Sliding, wheel's speed less pinion's", ylabel="mm/s")
-
-
-def _pressure(axes: Any, position: Array, content: Mapping[str, Any]) -> None:
-    curve(axes, position, content["contact_pressure_mpa"], SOUND, "new flanks")
-    worn, label = content["contact_pressure_at_end_mpa"], "at the end of the life"
-    curve(axes, position, worn, FAULTY, label, style="--")
-    axes.set(title="Largest contact pressure", ylabel="MPa")
-    axes.set_ylim(bottom=0.0)
-    axes.legend()
-
-
-def _per_mesh(axes: Any, position: Array, content: Mapping[str, Any]) -> None:
-    for name, color in zip(SIDES, COLORS, strict=False):
-        curve(axes, position, content[f"{name}_wear_per_mesh_nm"], color, name)
-    axes.set(title="Wear of a mesh, new flanks", ylabel="nm")
-    axes.legend()
-
-
-def _depth(axes: Any, position: Array, life: WearLife) -> None:
+def _depth(position: Any, life: WearLife) -> list[Mark]:
     """Both flanks at the quarters of the life; the thinner, the earlier."""
-    for side, (name, color) in enumerate(zip(SIDES, COLORS, strict=False)):
+    marks = []
+    for side, name in enumerate(SIDES):
         labels = (None, None, None, name)
         for quarter, (snapshot, label) in enumerate(zip(SHOWN, labels, strict=True)):
             depth = life.depth[snapshot, side].max(axis=0) * 1e6
-            curve(axes, position, depth, color, label, width=0.5 + 0.5 * quarter)
-    axes.invert_yaxis()
-    title = "Worn off at each quarter of the life"
-    axes.set(title=title, ylabel="depth normal to the flank, um")
-    axes.legend()
+            width = 0.5 + 0.5 * quarter
+            marks.append(curve(position, depth, label, COLORS[side], width=width))
+    return marks
 
 
-def _radii(axes: Any, position: Array, content: Mapping[str, Any]) -> None:
-    highest = 0.0
+def _radii(content: Mapping[str, Any]) -> tuple[list[Mark], float]:
+    """Curvature radii of both flanks, and the largest of new ones."""
+    position, marks, highest = content["position_mm"], [], 0.0
     for name, color in zip(SIDES, COLORS, strict=False):
         new, worn, by_paper = (
             np.array(content[f"{name}_curvature_radius_{state}_mm"], dtype=float)
@@ -115,41 +107,43 @@ def _radii(axes: Any, position: Array, content: Mapping[str, Any]) -> None:
         )
         shown = np.where((worn > 0.0) & (worn < TALLEST * new.max()), worn, np.nan)
         highest = max(highest, new.max())
-        curve(axes, position, new, color, f"{name}, new")
-        curve(axes, position, shown, color, f"{name}, worn profile", style="--")
-        curve(axes, position, by_paper, THIRD, style=":")
-    title = "Curvature radius (green: eq. 22 of the paper)"
-    axes.set(title=title, ylabel="mm", ylim=(0.0, TALLEST * highest))
-    axes.legend(fontsize="small")
+        marks += [
+            curve(position, new, f"{name}, new", color),
+            curve(position, shown, f"{name}, worn profile", color, "--"),
+            curve(position, by_paper, None, THIRD, ":"),
+        ]
+    return marks, highest
 
 
-def _history(axes: Any, content: Mapping[str, Any]) -> None:
+def _history(content: Mapping[str, Any]) -> Panel:
     history, vibration = content["history"], content.get("vibration")
-    for name, color in zip(SIDES, COLORS, strict=False):
-        curve(axes, history["hours"], history[f"{name}_depth_um"], color, name)
-    titles(axes, "Deepest point over time", "hours", "um")
-    axes.legend(loc="upper left")
+    hours, second = history["hours"], None
     error = history["transmission_error_peak_to_peak_um"]
     if vibration is not None:
-        second = axes.twinx()
-        hours = np.array(vibration["hours"])
+        times = np.array(vibration["hours"])
         loudest = np.array(vibration["rms_m_per_s2"]).max(axis=1)
-        shown = hours <= content["life_hours"] * 1.001
-        second.plot(hours[shown], loudest[shown], ":o", color=GREY, markersize=3)
-        second.set_ylabel("RMS of the loudest sensor (dotted), m/s2")
-        second.set_ylim(bottom=0.0)
+        shown = times <= content["life_hours"] * 1.001
+        dots = curve(times[shown], loudest[shown], None, GREY, ":o", None, markersize=3)
+        unit = "RMS of the loudest sensor (dotted), m/s2"
+        second = Panel("", "", unit, [dots], ylim=(0.0, None))
     elif math.isfinite(error[0]):
-        second = axes.twinx()
-        curve(second, history["hours"], error, GREY, style=":")
-        second.set_ylabel("transmission error, peak to peak (dotted), um")
-        second.set_ylim(bottom=0.0)
+        unit = "transmission error, peak to peak (dotted), um"
+        dotted = curve(hours, error, None, GREY, ":")
+        second = Panel("", "", unit, [dotted], ylim=(0.0, None))
+    depths = curves(hours, {name: history[f"{name}_depth_um"] for name in SIDES})
+    title = "Deepest point over time"
+    return Panel(title, "hours", "um", depths, legend="upper left", second=second)
 
 
-def _map(figure: Any, axes: Any, lives: LifeMap, content: Mapping[str, Any]) -> None:
+def _map(lives: LifeMap, content: Mapping[str, Any]) -> Panel:
     rpm, hours = lives.speed * 30.0 / math.pi, np.log10(lives.hours)
-    image = axes.contourf(rpm, lives.torque, hours, levels=14, cmap="cividis")
+    values, look = (rpm, lives.torque, hours), {"levels": 14, "cmap": "cividis"}
+    colors = Mark("contourf", values, look, "log$_{10}$ of the hours")
     point = content["speed_rpm"], content["torque_nm"]
-    axes.plot(*point, "o", color=FAULTY, clip_on=False)
-    speed, torque = "speed of the pinion, r/min", "torque of the pinion, N m"
-    titles(axes, "Life", speed, torque, xscale="log", yscale="log")
-    figure.colorbar(image, ax=axes, label="log$_{10}$ of the hours")
+    return Panel(
+        "Life",
+        "speed of the pinion, r/min",
+        "torque of the pinion, N m",
+        [colors, curve(*point, None, FAULTY, "o", clip_on=False)],
+        log="xy",
+    )

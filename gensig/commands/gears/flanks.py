@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,20 +14,20 @@ from numpy.typing import NDArray
 
 from gensig.commands.console import remark
 from gensig.commands.figures.flank_figures import (
-    plot_sliced_stiffness,
-    plot_transmission_error,
+    sliced_stiffness_figure,
+    transmission_error_figure,
 )
-from gensig.commands.figures.heat_figures import plot_heat
-from gensig.commands.gears.heat_report import heat_content, heat_report, print_heat
-from gensig.commands.output import check_outputs, highest, span, write_outputs
-from gensig.commands.request import read_configuration
+from gensig.commands.figures.heat_figures import heat_figure
+from gensig.commands.figures.panels import Figure
+from gensig.commands.gears.heat_report import heat_content, heat_lines, heat_report
+from gensig.commands.output import Answer, answered, highest, span
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.geometry.contact import GearPair
 from gensig.mesh.options import MOST_SLICES
+from gensig.options.configuration import Configuration
 from gensig.systems.registry import PairParts, read_sliced_pair
 from gensig.systems.sliced_pair import SlicedPair, TransmissionError
-from gensig.terminal.printing import show
 from gensig.terminal.warning_lines import one_line_warnings
 
 TOLERATED = 0.01  # error of a pressure that is not told
@@ -37,10 +36,9 @@ LOST_SHARE = 0.02  # of the bearing field; less is the edge of the reliefs
 LEAST_SHARE = 0.05
 
 
-def transmission_error(arguments: Namespace) -> int:
-    """Write static transmission error under load as JSON and figure, and print a summary."""
-    check_outputs(arguments)
-    config = read_configuration(arguments)
+@answered
+def transmission_error(config: Configuration, _: Namespace) -> Answer:
+    """Static transmission error under load."""
     with one_line_warnings("gensig"):
         system, faults = read_sliced_pair(config), read_faults(config["fault"])
         result = sound = system.transmission_error()
@@ -52,23 +50,28 @@ def transmission_error(arguments: Namespace) -> int:
     content["max_contact_pressure_error"] = pressure_error
     if faults:
         content["fault_adds_um"] = added_um(sound, result)
+    return Answer(
+        content,
+        _lines(system, result, content),
+        lambda: transmission_error_figure(system, result),
+    )
 
-    def draw(path: Path) -> None:
-        plot_transmission_error(system, result, path)
 
-    write_outputs(arguments, content, draw)
-    _print_contact_ratios(system.pair)
+def _lines(
+    system: SlicedPair, result: TransmissionError, content: Mapping[str, Any]
+) -> Iterator[str]:
+    pressure_error = content["max_contact_pressure_error"]
+    yield _contact_ratios(system.pair)
     orders = ", ".join(f"{value:.4f}" for value in content["harmonics_um"][:4])
-    show(f"transmission error, mean   {content['mean_um']:.4f} um")
-    show(f"peak to peak               {content['peak_to_peak_um']:.4f} um")
-    show(f"mesh orders 1 to 4         {orders} um")
-    show(f"largest line load          {content['max_line_load_n_per_mm']:.2f} N/mm")
+    yield f"transmission error, mean   {content['mean_um']:.4f} um"
+    yield f"peak to peak               {content['peak_to_peak_um']:.4f} um"
+    yield f"mesh orders 1 to 4         {orders} um"
+    yield f"largest line load          {content['max_line_load_n_per_mm']:.2f} N/mm"
     pressure = f"{content['max_contact_pressure_mpa']:.1f} MPa"
-    show(f"largest contact pressure   {pressure}{_with_error(system, pressure_error)}")
-    if faults:
-        _print_periods(result)
-        show(f"the fault adds             {span(content['fault_adds_um'], '.4g')} um")
-    return 0
+    yield f"largest contact pressure   {pressure}{_with_error(system, pressure_error)}"
+    if "fault_adds_um" in content:
+        yield _periods(result)
+        yield f"the fault adds             {span(content['fault_adds_um'], '.4g')} um"
 
 
 def _with_error(system: SlicedPair, error: float) -> str:
@@ -118,9 +121,7 @@ def transmission_error_content(
     }
 
 
-def sliced_stiffness(
-    parts: PairParts, fault: Mapping[str, Any], arguments: Namespace
-) -> int:
+def sliced_stiffness(parts: PairParts, fault: Mapping[str, Any]) -> Answer:
     """``gensig stiffness`` of a pair cut into slices."""
     faulty = None
     with one_line_warnings("gensig"):
@@ -152,31 +153,40 @@ def sliced_stiffness(
     if hot is not None:
         content["heat"] = heat_content(hot)
 
-    def draw(path: Path) -> None:
+    def figure() -> Figure:
         if hot is not None:
-            plot_heat(hot, path)
-            return
-        plot_sliced_stiffness(
-            system, result, position, single, path, faulty=faulty, sound=sound
+            return heat_figure(hot)
+        return sliced_stiffness_figure(
+            system, result, position, single, faulty=faulty, sound=sound
         )
 
-    write_outputs(arguments, content, draw)
+    lines = [*_stiffness_lines(pair, single, faulty, result, sound)]
+    if hot is not None:
+        lines += heat_lines(hot)
+    return Answer(content, lines, figure)
+
+
+def _stiffness_lines(
+    pair: GearPair,
+    single: NDArray[Any],
+    faulty: NDArray[Any] | None,
+    result: TransmissionError,
+    sound: TransmissionError,
+) -> Iterator[str]:
+    stiffness = result.contact.stiffness
     low, high = stiffness.min(), stiffness.max()
-    _print_contact_ratios(pair)
-    show(f"mesh stiffness, mean       {stiffness.mean():.4e} N/m")
-    show(f"mesh stiffness, range      {low:.4e} .. {high:.4e} N/m")
-    show(f"single pair, highest       {highest(single, faulty)}")
+    yield _contact_ratios(pair)
+    yield f"mesh stiffness, mean       {stiffness.mean():.4e} N/m"
+    yield f"mesh stiffness, range      {low:.4e} .. {high:.4e} N/m"
+    yield f"single pair, highest       {highest(single, faulty)}"
     if faulty is not None:
         without = np.tile(sound.contact.stiffness, result.n_periods)
         lost = 1e2 * (1.0 - stiffness / without)
         near = single > LEAST_SHARE * single.max()
         pair_lost = 1e2 * (1.0 - faulty[near] / single[near])
-        _print_periods(result)
-        show(f"the mesh loses             {span(lost, '.3g')} %")
-        show(f"faulty pair loses          {span(pair_lost, '.3g')} %")
-    if hot is not None:
-        print_heat(hot)
-    return 0
+        yield _periods(result)
+        yield f"the mesh loses             {span(lost, '.3g')} %"
+        yield f"faulty pair loses          {span(pair_lost, '.3g')} %"
 
 
 def sound_pair(parts: PairParts, fault: Mapping[str, Any]) -> SlicedPair:
@@ -190,15 +200,15 @@ def sound_pair(parts: PairParts, fault: Mapping[str, Any]) -> SlicedPair:
     return parts.flanks
 
 
-def _print_contact_ratios(pair: GearPair) -> None:
-    show(
+def _contact_ratios(pair: GearPair) -> str:
+    return (
         f"contact ratio              {pair.transverse_contact_ratio:.4f} transverse, "
         f"{pair.overlap_ratio:.4f} overlap, {pair.total_contact_ratio:.4f} total"
     )
 
 
-def _print_periods(result: TransmissionError) -> None:
-    show(
+def _periods(result: TransmissionError) -> str:
+    return (
         f"mesh periods               {result.n_periods}, "
         "the first faulty tooth enters at roll 0"
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +26,6 @@ from gensig.systems.hot_pair import (
     hot_state,
     stiffness_variants,
 )
-from gensig.terminal.printing import show
 
 NAMES = {
     COLD: "cold",
@@ -58,7 +58,8 @@ def heat_report(duty: Duty) -> HeatReport | None:
     return HeatReport(duty=duty, state=state, variants=stiffness_variants(duty, state))
 
 
-def _bodies(state: HotState) -> dict[str, BodyHeat]:
+def bodies(state: HotState) -> dict[str, BodyHeat]:
+    """Heat of both gears."""
     return {"pinion": state.pinion, "wheel": state.wheel}
 
 
@@ -80,7 +81,7 @@ def heat_content(report: HeatReport) -> dict[str, Any]:
                 "heat_to_oil_w": body.to_oil,
                 "heat_to_bore_w": body.to_bore,
             }
-            for name, body in _bodies(state).items()
+            for name, body in bodies(state).items()
         },
         "flash_contact_position": state.flash_position / pair.base_pitch,
         "flash_temperature_k": state.flash,
@@ -103,28 +104,28 @@ def heat_content(report: HeatReport) -> dict[str, Any]:
     }
 
 
-def print_heat(report: HeatReport) -> None:
-    """Print friction heat, temperatures, and stiffness effect by effect."""
+def heat_lines(report: HeatReport) -> Iterator[str]:
+    """Friction heat, temperatures, and stiffness effect by effect, in lines."""
     state, variants = report.state, report.variants
-    show(f"friction heat              {state.friction_heat / 1e3:.3f} kW")
-    for name, body in _bodies(state).items():
+    yield f"friction heat              {state.friction_heat / 1e3:.3f} kW"
+    for name, body in bodies(state).items():
         temperatures = f"{body.temperature[0]:.1f} .. {body.tooth:.1f}"
-        show(f"{name + ', bore to teeth':<27}{temperatures} degrees Celsius")
+        yield f"{name + ', bore to teeth':<27}{temperatures} degrees Celsius"
     flash = state.flash.max()
-    show(f"flash temperature          up to {flash:.1f} K above the teeth's")
-    show(f"{'':<27}{'contact ratio':>13}{'mesh, mean':>18}{'single, highest':>28}")
+    yield f"flash temperature          up to {flash:.1f} K above the teeth's"
+    yield f"{'':<27}{'contact ratio':>13}{'mesh, mean':>18}{'single, highest':>28}"
     for key, name in NAMES.items():
         if key in variants:
             line = _variant_line(variants[key], compared(variants, key))
-            show(f"{name:<27}{line}")
+            yield f"{name:<27}{line}"
     growth = f"{state.growth.teeth_alone(report.duty.system.pair) * 1e6:.1f} um"
     if APPARENT in variants:
         text = f"force over the approach less {growth} of tooth growth; no stiffness"
-        show(f"{'':<27}apparent: {text}")
+        yield f"{'':<27}apparent: {text}"
     elif report.duty.heat.growth:
         approach = variants[COLD].approach.mean() * 1e6
         text = f"teeth grow {growth}, more than the approach of {approach:.1f} um"
-        show(f"{NAMES[APPARENT]:<27}none: {text}")
+        yield f"{NAMES[APPARENT]:<27}none: {text}"
 
 
 def _variant_line(variant: Variant, cold: Variant) -> str:

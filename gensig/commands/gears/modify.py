@@ -3,44 +3,34 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
-from pathlib import Path
 from typing import Any
 
 from gensig.commands.console import step
-from gensig.commands.figures.flank_figures import plot_front
+from gensig.commands.figures.flank_figures import front_figure
 from gensig.commands.gears.flanks import sound_pair
-from gensig.commands.output import (
-    check_outputs,
-    option_file,
-    write_option,
-    write_outputs,
-)
-from gensig.commands.request import read_configuration
+from gensig.commands.output import Answer, answered
 from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification, PairModification
+from gensig.options.configuration import Configuration
 from gensig.systems.flank_optimum import Cases, Optimum, judge, optimise
 from gensig.systems.registry import PairParts
 from gensig.systems.sliced_pair import SlicedPair
-from gensig.terminal.printing import show
 from gensig.terminal.warning_lines import one_line_warnings
 from gensig.units import from_si
 
-GROUP = "modification"
 DIGITS = {"um": 3, "mm": 4}  # of the keys that are written: 1 nm and 0.1 um
 
 
-def modify_flank(arguments: Namespace) -> int:
-    """Search the front, print it, and write the chosen modification as an option."""
+@answered(group="modification")
+def modify_flank(config: Configuration, arguments: Namespace) -> Answer:
+    """The front of the best modifications, and the chosen one as an option."""
     if arguments.points < 1:
         raise ConfigError(
             f"--points {arguments.points}: give 1 for the least ripple alone, "
             "3 or more for a front"
         )
-    check_outputs(arguments)
-    target = option_file(arguments.out, GROUP, force=arguments.force)
-    config = read_configuration(arguments)
     with one_line_warnings("gensig"):
         system = sound_pair(PairParts(config), config["fault"])
         given = system.modification.misalignment
@@ -64,22 +54,21 @@ def modify_flank(arguments: Namespace) -> int:
         "chosen": _content(chosen),
         "front": [_content(optimum) for optimum in front],
     }
-
-    def draw(path: Path) -> None:
-        plot_front(system, before, chosen, front, path)
-
-    write_outputs(arguments, content, draw)
-    show(f"{'':<12}{'peak to peak':>14}{'line load':>16}   worst of {_cases(cases)}")
-    _print("before", before)
-    for optimum in front:
-        _print(("front", "chosen")[optimum is chosen], optimum)
-    write_option(target, option_text(chosen, system, cases))
-    return 0
+    states = [("before", before)]
+    states += [(("front", "chosen")[each is chosen], each) for each in front]
+    return Answer(
+        content,
+        _lines(states, cases),
+        lambda: front_figure(system, before, chosen, front),
+        lambda: option_text(chosen, system, cases),
+    )
 
 
-def _print(name: str, optimum: Optimum) -> None:
-    ripple, line_load = optimum.ripple * 1e6, optimum.line_load * 1e-3
-    show(f"{name:<12}{ripple:>11.4f} um{line_load:>11.2f} N/mm")
+def _lines(states: Sequence[tuple[str, Optimum]], cases: Cases) -> Iterator[str]:
+    yield f"{'':<12}{'peak to peak':>14}{'line load':>16}   worst of {_cases(cases)}"
+    for name, optimum in states:
+        ripple, line_load = optimum.ripple * 1e6, optimum.line_load * 1e-3
+        yield f"{name:<12}{ripple:>11.4f} um{line_load:>11.2f} N/mm"
 
 
 def _knee(front: Sequence[Optimum], before: Optimum) -> Optimum:

@@ -3,35 +3,34 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from gensig.commands.console import remark
-from gensig.commands.figures.machine_figures import plot_stiffness
-from gensig.commands.output import check_outputs, highest, span, write_outputs
-from gensig.commands.request import read_configuration
+from gensig.commands.figures.machine_figures import stiffness_figure
+from gensig.commands.figures.panels import Figure
+from gensig.commands.output import Answer, answered, highest, span
 from gensig.faults.registry import read_faults
+from gensig.options.configuration import Configuration
 from gensig.record.machines import read_machine
 from gensig.systems.base import Machine
 from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.registry import SLICED, PairParts
 from gensig.systems.stiffness_curves import StiffnessCurves
-from gensig.terminal.printing import show
 
 PAPER_KIND = "sum of pair stiffnesses (secant)"
 TANGENT_KIND = "tangent dF/d(approach) at static equilibrium"
 
 
-def stiffness(arguments: Namespace) -> int:
-    """Write mesh stiffness as JSON and figure, and print a summary."""
-    check_outputs(arguments)
-    config = read_configuration(arguments)
+@answered
+def stiffness(config: Configuration, _: Namespace) -> Answer:
+    """Mesh stiffness over the mesh of healthy and faulty teeth."""
     if config["system"].get("kind") == SLICED:
         from gensig.commands.gears.flanks import sliced_stiffness
 
-        return sliced_stiffness(PairParts(config), config["fault"], arguments)
+        return sliced_stiffness(PairParts(config), config["fault"])
     system = read_machine(config)
     faults = read_faults(config["fault"])
     curves = system.stiffness_curves(faults)
@@ -43,15 +42,13 @@ def stiffness(arguments: Namespace) -> int:
         )
     content = stiffness_content(system, curves)
 
-    def draw(path: Path) -> None:
+    def figure() -> Figure:
         sound = curves
         if faults:
             sound = system.stiffness_curves()
-        plot_stiffness(system, curves, faults, path, sound=sound)
+        return stiffness_figure(system, curves, faults, sound)
 
-    write_outputs(arguments, content, draw)
-    _print(content, curves)
-    return 0
+    return Answer(content, _lines(content, curves), figure)
 
 
 def stiffness_content(system: Machine, curves: StiffnessCurves) -> dict[str, Any]:
@@ -86,23 +83,23 @@ def stiffness_content(system: Machine, curves: StiffnessCurves) -> dict[str, Any
     return content
 
 
-def _print(content: dict[str, Any], curves: StiffnessCurves) -> None:
+def _lines(content: dict[str, Any], curves: StiffnessCurves) -> Iterator[str]:
     mesh, single = curves.mesh_stiffness, curves.single_pair_stiffness
     faulty = curves.faulty_pair_stiffness
-    show(f"transverse contact ratio   {content['transverse_contact_ratio']:.5f}")
-    show(f"base pitch                 {content['base_pitch_mm']:.5f} mm")
-    show(f"mesh stiffness, mean       {mesh.mean():.4e} N/m")
-    show(f"mesh stiffness, range      {mesh.min():.4e} .. {mesh.max():.4e} N/m")
-    show(f"single pair, highest       {highest(single, faulty)}")
+    yield f"transverse contact ratio   {content['transverse_contact_ratio']:.5f}"
+    yield f"base pitch                 {content['base_pitch_mm']:.5f} mm"
+    yield f"mesh stiffness, mean       {mesh.mean():.4e} N/m"
+    yield f"mesh stiffness, range      {mesh.min():.4e} .. {mesh.max():.4e} N/m"
+    yield f"single pair, highest       {highest(single, faulty)}"
     if "long_tip_relief" in content:
         sides = ", ".join(
             f"{name} {side['tip_relief_um']:.2f} um "
             f"over {side['tip_relief_height_mm']:.2f} mm"
             for name, side in content["long_tip_relief"].items()
         )
-        show(f"tip relief for this torque {sides} of height")
+        yield f"tip relief for this torque {sides} of height"
     if faulty is not None:
         loss = 1e2 * (1.0 - faulty / single)
-        show(f"faulty pair loses          {span(loss, '.2f')} %")
+        yield f"faulty pair loses          {span(loss, '.2f')} %"
         gap = span(content["faulty_pair_gap_um"], ".3g")
-        show(f"faulty pair touches later  {gap} um")
+        yield f"faulty pair touches later  {gap} um"

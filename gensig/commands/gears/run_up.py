@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.commands.figures.machine_figures import shown_channel
-from gensig.commands.figures.motor_figures import turner
+from gensig.commands.lines.results import turner
 from gensig.driveline.machine import LineMachine
 from gensig.dynamics.response import natural_frequencies
 from gensig.errors import ConfigError

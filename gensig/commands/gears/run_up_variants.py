@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.commands.console import remark, step
-from gensig.commands.figures.variants_figure import plot_variants
+from gensig.commands.figures.variants_figure import variants_figure
 from gensig.commands.gears.run_up import (
     ACCELERATION_REFERENCE,
     HARMONICS,
@@ -21,14 +21,14 @@ from gensig.commands.gears.run_up import (
     shaft_angle,
 )
 from gensig.commands.gears.simulate import configured_row
-from gensig.commands.output import check_outputs, write_outputs
+from gensig.commands.output import Answer, answered
 from gensig.errors import ConfigError
+from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
 from gensig.record.simulate import Record, simulate_record
 from gensig.signals.run_up.level_map import decibels
 from gensig.signals.run_up.speed_maps import LEAST_CHANGE, order_map
 from gensig.systems.base import Machine
-from gensig.terminal.printing import show
 from gensig.units import channel_unit
 
 FIRST = "as configured"
@@ -59,16 +59,13 @@ class Vibration:
         return Vibration(speed=speed, total=total, mesh=mesh)
 
 
-def run_up(arguments: Namespace) -> int:
-    """Write and draw the vibration of the variants over the speed, and print its mean change."""
-    check_outputs(arguments)
-    overrides = [*(arguments.overrides or [])]
-    words = {FIRST: overrides}
-    words |= {each: [*overrides, each] for each in arguments.against}
-    configs = {
-        name: read_request(given, config_dir=arguments.config_dir).config
-        for name, given in words.items()
-    }
+@answered
+def run_up(config: Configuration, arguments: Namespace) -> Answer | int:
+    """The vibration of the variants over the speed, and its mean change."""
+    configs = {FIRST: config}
+    for each in arguments.against:
+        words = [*arguments.overrides, each]
+        configs[each] = read_request(words, config_dir=arguments.config_dir).config
     variants: dict[str, Vibration] = {}
     for name, config in configs.items():
         step(f"run-up of {name}")
@@ -81,13 +78,7 @@ def run_up(arguments: Namespace) -> int:
     speed = variants[FIRST].speed
     variants = {name: each.at(speed) for name, each in variants.items()}
     content = _content(variants)
-
-    def draw(path: Path) -> None:
-        plot_variants(content, path)
-
-    write_outputs(arguments, content, draw)
-    _print_changes(content)
-    return 0
+    return Answer(content, _changes(content), lambda: variants_figure(content))
 
 
 def _vibration(machine: Machine, record: Record) -> Vibration:
@@ -151,13 +142,13 @@ def _content(variants: dict[str, Vibration]) -> dict[str, Any]:
     return content
 
 
-def _print_changes(content: dict[str, Any]) -> None:
-    """Print the mean change of every variant over the speed."""
+def _changes(content: dict[str, Any]) -> Iterator[str]:
+    """The mean change of every variant over the speed."""
     rpm = content["speeds_rpm"]
-    show(f"run-up, {rpm[0]:.0f} to {rpm[-1]:.0f} r/min, RMS against {FIRST}:")
+    yield f"run-up, {rpm[0]:.0f} to {rpm[-1]:.0f} r/min, RMS against {FIRST}:"
     for name, total in content["total_change_db"].items():
         mesh = content["mesh_change_db"][name]
-        show(
+        yield (
             f"  {name}: {np.nanmean(total):+.2f} dB on average, {np.nanmin(total):+.2f} to "
             f"{np.nanmax(total):+.2f}; mesh orders {np.nanmean(mesh):+.2f} dB"
         )

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from gensig.commands.console import note, remark, replaced_file
-from gensig.commands.figures.machine_figures import plot_record, record_name
-from gensig.commands.figures.run_up_figure import plot_run_up
+from gensig.commands.figures.machine_figures import record_figure, record_name
+from gensig.commands.figures.panels import draw
+from gensig.commands.figures.run_up_figure import run_up_figure
 from gensig.commands.gears.run_up import (
     RunUp,
     print_run_up,
@@ -133,12 +134,13 @@ def _show(
             else:
                 _write_shard(reader, record, path)
     if arguments.plot:
+        if run_up is None:
+            sound = _without_fault(reader, row, record)
+            figure = record_figure(system, acceleration, values, name=name, sound=sound)
+        else:
+            figure = run_up_figure(run_up, record_name(values, name))
         with replaced_file(arguments.plot) as path:
-            if run_up is None:
-                sound = _without_fault(reader, row, record)
-                plot_record(system, acceleration, values, path, name=name, sound=sound)
-            else:
-                plot_run_up(run_up, path, name=record_name(values, name))
+            draw(figure, path)
     if arguments.orders and run_up is not None:
         with replaced_file(arguments.orders) as path:
             write_levels(run_up, path)

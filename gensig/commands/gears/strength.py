@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Iterator
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.commands.figures.strength_figure import plot_root_stress
-from gensig.commands.output import check_outputs, write_outputs
-from gensig.commands.request import read_configuration
+from gensig.commands.figures.strength_figure import root_stress_figure
+from gensig.commands.output import Answer, answered
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.life.root.strength import reliability
+from gensig.options.configuration import Configuration
 from gensig.systems.root_strength import (
     GearStress,
     RootHistory,
     RootStrength,
     read_root_strength,
 )
-from gensig.terminal.printing import show
 
 FACTORS = (
     "form_factor",
@@ -54,10 +53,9 @@ ROWS = (
 )
 
 
-def root_stress(arguments: Namespace) -> int:
-    """Write root stress and safety factors as JSON and figure, and print a summary."""
-    check_outputs(arguments)
-    config = read_configuration(arguments)
+@answered
+def root_stress(config: Configuration, arguments: Namespace) -> Answer:
+    """Root stress and safety factors."""
     if read_faults(config["fault"]):
         raise ConfigError(
             f"fault={config['fault']['kind']}: root stress is that of healthy teeth here; "
@@ -71,13 +69,11 @@ def root_stress(arguments: Namespace) -> int:
     if arguments.stress is not None:
         force = system.force_over_mesh_for(arguments.stress * 1e6)
         content["tangential_force_over_mesh_n"] = force
-
-    def draw(path: Path) -> None:
-        plot_root_stress(system, gears, history, path)
-
-    write_outputs(arguments, content, draw)
-    _print(system, content)
-    return 0
+    return Answer(
+        content,
+        _lines(system, content),
+        lambda: root_stress_figure(system, gears, history),
+    )
 
 
 def root_stress_content(
@@ -124,20 +120,20 @@ def _gear_content(gear: GearStress, stress: NDArray[np.float64]) -> dict[str, An
     }
 
 
-def _print(system: RootStrength, content: dict[str, Any]) -> None:
+def _lines(system: RootStrength, content: dict[str, Any]) -> Iterator[str]:
     strength, gears = system.strength, content["gears"]
     force, torque = content["tangential_force_n"], content["torque_nm"]
-    show(f"tangential force           {force:.1f} N, {torque:.2f} N m")
+    yield f"tangential force           {force:.1f} N, {torque:.2f} N m"
     if "tangential_force_over_mesh_n" in content:
         force = content["tangential_force_over_mesh_n"]
-        show(f"over the mesh it takes     {force:.1f} N")
+        yield f"over the mesh it takes     {force:.1f} N"
     load_point = strength.load_point.replace("_", " ")
-    show(f"load point                 {load_point}, ISO 6336-3:{strength.edition}")
-    show(f"{'':<27}" + "".join(f"{name:>16}" for name in gears))
+    yield f"load point                 {load_point}, ISO 6336-3:{strength.edition}"
+    yield f"{'':<27}" + "".join(f"{name:>16}" for name in gears)
     for label, key, form in ROWS:
         cells = [f"{gear[key]:>16{form}}" for gear in gears.values()]
-        show(f"{label:<27}{''.join(cells)}")
-    show(
+        yield f"{label:<27}{''.join(cells)}"
+    yield (
         f"strength {strength.name}: sigma_Flim {strength.bending_limit * 1e-6:g} MPa, "
         f"K_FN {strength.paper_life_factor:g}, "
         f"Y_ST {strength.test_gear_stress_correction:g}, "
@@ -146,7 +142,7 @@ def _print(system: RootStrength, content: dict[str, Any]) -> None:
         f"Y_R {strength.relative_surface_factor:g}, "
         f"Y_X {content['size_factor']:g}, Y_M {strength.mean_stress_factor:g}"
     )
-    show(
+    yield (
         f"load factors: K_A {strength.application_factor:g}, "
         f"K_gamma {strength.mesh_load_factor:g}, K_v {strength.dynamic_factor:g}, "
         f"K_F_beta {strength.face_load_factor:g}, "

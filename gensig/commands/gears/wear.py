@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from argparse import Namespace
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,15 +12,9 @@ import yaml
 from numpy.typing import NDArray
 
 from gensig.commands.console import remark
-from gensig.commands.figures.wear_figure import plot_wear_life
-from gensig.commands.gears.wear_summary import print_wear_life
-from gensig.commands.output import (
-    check_outputs,
-    option_file,
-    write_option,
-    write_outputs,
-)
-from gensig.commands.request import read_configuration
+from gensig.commands.figures.wear_figure import wear_life_figure
+from gensig.commands.gears.wear_summary import wear_lines
+from gensig.commands.output import Answer, answered
 from gensig.errors import ConfigError, SimulationError
 from gensig.life.life_laws import (
     FittedLaw,
@@ -35,6 +28,7 @@ from gensig.life.wear.archard import flank_radii, hunting_turns
 from gensig.life.wear.wear_case import WearCase
 from gensig.life.wear.wear_life import WearLife, hours, wear_life
 from gensig.operation.options import read_operating
+from gensig.options.configuration import Configuration
 from gensig.record.inputs import InputReader
 from gensig.record.vibration_limit import WornVibration, limited_by_vibration
 from gensig.systems.wear import read_wear_case, wear_fault
@@ -42,7 +36,6 @@ from gensig.terminal.warning_lines import one_line_warnings
 
 Array = NDArray[np.float64]
 
-GROUP = "fault"
 # shares of the configured torque and speed
 MAP_TORQUES = np.geomspace(0.25, 1.5, 6)
 MAP_SPEEDS = np.geomspace(0.25, 2.0, 7)
@@ -50,13 +43,9 @@ MAP_SPEEDS = np.geomspace(0.25, 2.0, 7)
 YIELD_SHARE = 0.6
 
 
-def wear_life_verb(arguments: Namespace) -> int:
-    """Write life and wear as JSON, figure and option, and print a summary."""
-    check_outputs(arguments)
-    target = None
-    if arguments.out is not None:
-        target = option_file(arguments.out, GROUP, force=arguments.force)
-    config = read_configuration(arguments)
+@answered(group="fault")
+def wear_life_verb(config: Configuration, arguments: Namespace) -> Answer:
+    """Life and wear of a pair's flanks, and the worn flanks as an option."""
     with one_line_warnings("gensig"):
         case = read_wear_case(config)
         speed = read_operating(config.section("operating")).speed
@@ -69,15 +58,12 @@ def wear_life_verb(arguments: Namespace) -> int:
         lives, laws = _lives(case, speed, arguments)
         content = wear_life_content(life, speed, lives, laws, vibration)
     _warn_of_pressure(case, content)
-
-    def draw(path: Path) -> None:
-        plot_wear_life(life, speed, content, lives, path)
-
-    write_outputs(arguments, content, draw)
-    print_wear_life(content, lives, laws)
-    if target is not None:
-        _write_option(life, speed, target)
-    return 0
+    return Answer(
+        content,
+        wear_lines(content, lives, laws),
+        lambda: wear_life_figure(life, content, lives),
+        lambda: _option_text(life, speed),
+    )
 
 
 def _lives(
@@ -257,13 +243,12 @@ def _warn_of_pressure(case: WearCase, content: dict[str, Any]) -> None:
         )
 
 
-def _write_option(life: WearLife, speed: float, target: Path) -> None:
-    """Write the worn flanks as an option of the group ``fault``."""
+def _option_text(life: WearLife, speed: float) -> str:
+    """The worn flanks as an option of the group ``fault``."""
     case, pair = life.case, life.case.pair
     option = yaml.safe_dump(
         wear_fault(case, life.depth[-1]), sort_keys=False, width=110
     )
     teeth = f"{pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth"
     duration = f"{hours(life.life, speed):.4g} h at {case.torque:g} N m"
-    head = f"# Flanks of {teeth} after {duration} (gensig wear-life).\n"
-    write_option(target, head + option)
+    return f"# Flanks of {teeth} after {duration} (gensig wear-life).\n{option}"

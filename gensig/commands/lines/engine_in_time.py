@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,6 @@ from gensig.driveline.teeth import ToothLaw
 from gensig.driveline.time_root_stress import typical_largest
 from gensig.errors import ConfigError
 from gensig.life.root.strength import RELIABILITY, reliability
-from gensig.terminal.printing import show
 from gensig.units import from_si, to_si
 
 LONGEST_TIME = 60.0  # s
@@ -145,10 +144,10 @@ def root_content(
     }
 
 
-def print_in_time(content: Mapping[str, Any]) -> None:
-    """Print the summary of ``--time``."""
+def time_lines(content: Mapping[str, Any]) -> Iterator[str]:
+    """Summary of ``--time``."""
     residual = content["time_energy_residual"]
-    show(f"in time, teeth free to part (energy residual {residual:.1g}):")
+    yield f"in time, teeth free to part (energy residual {residual:.1g}):"
     nodes = zip(
         content["shown_nodes"],
         content["time_typical_fluctuation_rpm"],
@@ -157,7 +156,7 @@ def print_in_time(content: Mapping[str, Any]) -> None:
         strict=True,
     )
     for node, typical, whole, cycle in nodes:
-        show(
+        yield (
             f"  node {node:>3} +- {typical:.2f} r/min in a cycle, {whole:.2f} in all, "
             f"{cycle:.2f} of the mean cycle"
         )
@@ -172,44 +171,44 @@ def print_in_time(content: Mapping[str, Any]) -> None:
         strict=True,
     )
     for name, least, greatest, low, high, apart, back in meshes:
-        show(
+        yield (
             f"  mesh {name:>6} {least:7.0f} .. {greatest:.0f} N in a cycle, "
             f"{low:.0f} .. {high:.0f} in all, "
             f"apart {apart:.1%}, on the back flanks {back:.1%}"
         )
 
 
-def print_roots(content: Mapping[str, Any]) -> None:
-    """Print the summary of ``--mesh``."""
+def root_lines(content: Mapping[str, Any]) -> Iterator[str]:
+    """Summary of ``--mesh``."""
     roots, mesh = content["root_stress"], content["root_stress_mesh"]
-    show(f"root stress of mesh {mesh}, {roots['linear']['decisive_gear']}:")
+    yield f"root stress of mesh {mesh}, {roots['linear']['decisive_gear']}:"
     for name, root in roots.items():
         change, stress = "", root["iso_root_stress_mpa"]
         if name + WITHOUT in roots:
             before = roots[name + WITHOUT]["iso_root_stress_mpa"]
             change = f", {stress / before - 1.0:+.1%} by the dampers"
-        show(
+        yield (
             f"  {name.replace('_', ' '):<24} {root['greatest_tooth_force_n']:7.0f} N, "
             f"{stress:.1f} MPa by ISO 6336-3, "
             f"{root['largest_root_stress_mpa']:.1f} over the mesh{change}"
         )
         paper, iso = root["safety_factor_paper"], root["safety_factor_iso"]
-        show(
+        yield (
             f"  {'':<24} safety {paper:.3f} ({root['reliability_paper']}) by the paper, "
             f"{iso:.3f} ({root['reliability_iso']}) by ISO 6336-3"
         )
     classes = [f"{rank.name} from {rank.least_safety:.2f} on" for rank in RELIABILITY]
-    show(f"  reliability: {', '.join(classes)}")
+    yield f"  reliability: {', '.join(classes)}"
 
 
-def print_sweep(content: Mapping[str, Any]) -> None:
-    """Print the summary of ``--sweep``."""
+def sweep_lines(content: Mapping[str, Any]) -> Iterator[str]:
+    """Summary of ``--sweep``."""
     n_speeds = len(content["sweep_speeds_rpm"])
     seconds, residual = (
         content["sweep_seconds_each_way"],
         content["sweep_energy_residual"],
     )
-    show(f"sweep up and down, {seconds:g} s each way (energy residual {residual:.1g}):")
+    yield f"sweep up and down, {seconds:g} s each way (energy residual {residual:.1g}):"
     nodes = zip(
         content["shown_nodes"],
         content["sweep_up"]["speed_fluctuation_rpm"],
@@ -220,7 +219,7 @@ def print_sweep(content: Mapping[str, Any]) -> None:
         strict=True,
     )
     for node, up, down, apart, most, speed in nodes:
-        show(
+        yield (
             f"  node {node:>3} +- up to {max(up):.1f} r/min going up, "
             f"{max(down):.1f} going down; up less down at most {most:+.0%}, "
             f"at {speed:.0f} r/min; told apart at {sum(apart)} of {n_speeds} speeds"

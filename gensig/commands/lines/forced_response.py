@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.commands.figures.engine_figures import plot_response
+from gensig.commands.figures.line_figures import response_figure
 from gensig.commands.lines.engine_in_time import (
     WITHOUT,
-    print_in_time,
-    print_roots,
-    print_sweep,
     root_content,
+    root_lines,
     simulate_sweep,
     simulate_time,
     sweep_content,
+    sweep_lines,
     time_content,
+    time_lines,
 )
 from gensig.commands.lines.results import RPM, ResponseResult, spaced, speed_steps
-from gensig.commands.output import check_outputs, plain, write_outputs
-from gensig.commands.request import read_configuration
+from gensig.commands.output import Answer, answered, plain
 from gensig.driveline.engine_dampers import (
     DynamicRootStress,
     dynamic_root_stress,
@@ -46,18 +44,17 @@ from gensig.driveline.linear.forced import (
 from gensig.driveline.teeth import ToothLaw
 from gensig.driveline.time_root_stress import root_stress_in_time
 from gensig.errors import ConfigError
+from gensig.options.configuration import Configuration
 from gensig.systems.root_strength import RootStrength
-from gensig.terminal.printing import show
 from gensig.units import from_si, to_si
 
 CYCLE_POINTS = 5760
 RUN_ORDERS = 80  # half orders of a run: up to order 40
 
 
-def forced_response(arguments: Namespace) -> int:
-    """Write speed fluctuation, spectra and tooth forces as JSON and figure; print a summary."""
-    check_outputs(arguments)
-    config = read_configuration(arguments)
+@answered
+def forced_response(config: Configuration, arguments: Namespace) -> Answer:
+    """Speed fluctuation, spectra and tooth forces."""
     line = read_engine_line(config)
     result = _steady(line, arguments, config.seed)
     in_time = arguments.time is not None or arguments.sweep is not None
@@ -94,13 +91,7 @@ def forced_response(arguments: Namespace) -> int:
         )
         result = replace(result, sweep=sweep)
     content = response_content(line, result)
-
-    def draw(path: Path) -> None:
-        plot_response(line, result, path)
-
-    write_outputs(arguments, content, draw)
-    _print(content)
-    return 0
+    return Answer(content, _lines(content), lambda: response_figure(line, result))
 
 
 def response_content(line: EngineLine, result: ResponseResult) -> dict[str, Any]:
@@ -254,15 +245,15 @@ def _run(
     return run_of_speeds(linear, torques_at, speeds, indices, n_orders=RUN_ORDERS)
 
 
-def _print(content: dict[str, Any]) -> None:
+def _lines(content: dict[str, Any]) -> Iterator[str]:
     point = f"{content['speed_rpm']:g} r/min, {content['torque_nm']:.6g} N m"
     if "indicated_torque_nm" in content:
         indicated, peak = content["indicated_torque_nm"], content["peak_pressure_mpa"]
-        show(
+        yield (
             f"{point} at the crank, {indicated:.5g} N m indicated, peak {peak:.4g} MPa"
         )
     else:
-        show(f"{point} of the load at the motor")
+        yield f"{point} of the load at the motor"
     nodes = zip(
         content["node_numbers"],
         content["nodes"],
@@ -273,9 +264,9 @@ def _print(content: dict[str, Any]) -> None:
     rows = {number: row for number, *row in nodes}
     for number in content["shown_nodes"]:
         name, mean, half = rows[number]
-        show(f"  node {number:>3} {name:<34} {mean:8.1f} r/min +- {half:.2f}")
+        yield f"  node {number:>3} {name:<34} {mean:8.1f} r/min +- {half:.2f}"
     for name, value in content["toothed_wheel_fluctuation_rpm"].items():
-        show(f"  toothed wheel {name} shows +- {value:.2f} r/min")
+        yield f"  toothed wheel {name} shows +- {value:.2f} r/min"
     forces = zip(
         content["meshes"],
         content["least_tooth_force_n"],
@@ -287,10 +278,10 @@ def _print(content: dict[str, Any]) -> None:
         line = f"  mesh {name:>6} {low:9.0f} .. {high:.0f} N, mean {mean:.0f} N"
         if min(low * mean, high * mean) < 0.0:
             line += " (would part)"
-        show(line)
+        yield line
     if "time_energy_residual" in content:
-        print_in_time(content)
+        yield from time_lines(content)
     if "root_stress" in content:
-        print_roots(content)
+        yield from root_lines(content)
     if "sweep_energy_residual" in content:
-        print_sweep(content)
+        yield from sweep_lines(content)

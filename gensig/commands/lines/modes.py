@@ -3,43 +3,33 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
-from gensig.commands.figures.mode_figures import plot_modes
-from gensig.commands.output import check_outputs, write_outputs
-from gensig.commands.request import read_configuration
+from gensig.commands.figures.mode_figures import mode_figure
+from gensig.commands.output import Answer, answered
 from gensig.driveline.drive_line import DriveLine, drive_line_of_pair, read_drive_line
 from gensig.driveline.linear.modal import Modes
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.options.configuration import Configuration
 from gensig.systems.registry import LINE, read_system
-from gensig.terminal.printing import show
 
 SHOWN = 12  # modes in the summary
 MOST_MOTIONS = 3  # of a mode in the summary
 LEAST_SHARE = 0.05  # of the kinetic energy of a motion in the summary
 
 
-def modes(arguments: Namespace) -> int:
-    """Write frequencies, damping, shapes and energy shares as JSON and figure, and print them."""
-    check_outputs(arguments)
-    config = read_configuration(arguments)
+@answered
+def modes(config: Configuration, _: Namespace) -> Answer:
+    """Frequencies, damping, shapes and energy shares."""
     line = read_line(config)
     result = line.modes()
     content = modes_content(line, result)
-
-    def draw(path: Path) -> None:
-        plot_modes(line, result, path)
-
-    write_outputs(arguments, content, draw)
-    _print_sizes(line, content)
-    _print_modes(line, result, content)
-    return 0
+    lines = _lines(line, result, content)
+    return Answer(content, lines, lambda: mode_figure(line, result))
 
 
 def read_line(config: Configuration) -> DriveLine:
@@ -84,7 +74,7 @@ def modes_content(line: DriveLine, modes: Modes) -> dict[str, Any]:
     }
 
 
-def _print_sizes(line: DriveLine, content: Mapping[str, Any]) -> None:
+def _sizes(line: DriveLine, content: Mapping[str, Any]) -> str:
     n_nodes = len(line.line.nodes)
     n_lateral = len(line.matrices().coordinate_names) - n_nodes
     counts = {
@@ -96,16 +86,17 @@ def _print_sizes(line: DriveLine, content: Mapping[str, Any]) -> None:
         "rigid mode(s)": content["n_rigid_modes"],
     }
     sizes = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-    show(f"{content['system']}: {sizes}")
+    return f"{content['system']}: {sizes}"
 
 
-def _print_modes(line: DriveLine, modes: Modes, content: Mapping[str, Any]) -> None:
-    """Print the lowest modes with the motions that have most of the kinetic energy."""
+def _lines(line: DriveLine, modes: Modes, content: Mapping[str, Any]) -> Iterator[str]:
+    """Sizes, and the lowest modes with the motions that have most of the kinetic energy."""
+    yield _sizes(line, content)
     motions, n_nodes = list(line.matrices().coordinate_names), len(line.line.nodes)
     if len(motions) > n_nodes:
         motions[:n_nodes] = [f"{name} rotation" for name in motions[:n_nodes]]
     frequencies = content["natural_frequencies_hz"]
-    show(f"{'mode':>4} {'Hz':>10} {'damping':>8}  kinetic energy")
+    yield f"{'mode':>4} {'Hz':>10} {'damping':>8}  kinetic energy"
     for mode, frequency in enumerate(frequencies[:SHOWN]):
         share = modes.kinetic_share[mode]
         largest = np.argsort(-share, kind="stable")[:MOST_MOTIONS]
@@ -120,9 +111,9 @@ def _print_modes(line: DriveLine, modes: Modes, content: Mapping[str, Any]) -> N
         elif strain > 0.5:
             text += f"; {strain:.0%} of the strain in a mesh"
         damping = content["damping_ratio"][mode]
-        show(f"{mode:>4} {frequency:>10.2f} {damping:>8.4f}  {text}")
+        yield f"{mode:>4} {frequency:>10.2f} {damping:>8.4f}  {text}"
     n_more = len(frequencies) - SHOWN
     if n_more > 0:
-        show(
+        yield (
             f"and {n_more} more, up to {frequencies[-1]:.0f} Hz; --json FILE has them all"
         )

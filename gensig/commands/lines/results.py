@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gensig.driveline.engine_dampers import DynamicRootStress, ToothLoad
 from gensig.driveline.engine_line import EngineLine
+from gensig.driveline.excitation.engine_torques import Engine
 from gensig.driveline.excitation.line_torques import LineTorques
 from gensig.driveline.in_time import TimeResponse
 from gensig.driveline.linear.forced import SteadyResponse, Waterfall
@@ -64,6 +65,29 @@ class DamperState:
     response: SteadyResponse
     load: ToothLoad
     root: DynamicRootStress
+
+
+def turner(line: EngineLine) -> str:
+    """Name of the shaft that the speeds and angles of a line are given for."""
+    if isinstance(line.engine, Engine):
+        return "crank"
+    return "motor"
+
+
+def natural_hz(line: EngineLine) -> dict[str, float]:
+    """Natural frequencies of a line, Hz, by their rounded values."""
+    frequencies = line.drive.modes().frequency
+    return {f"{hz:.0f}": float(hz) for hz in frequencies if hz > 0.0}
+
+
+def turns_evenly(line: EngineLine) -> bool:
+    """True when nothing excites the line while its meshes never part."""
+    return not isinstance(line.engine, Engine) and line.engine.ripple is None
+
+
+def node_name(line: EngineLine, node: int) -> str:
+    """Name and number of a node."""
+    return f"{line.drive.line.nodes[line.drive.numbers.index(node)].name} ({node})"
 
 
 def roll_degrees(root: DynamicRootStress) -> Array:

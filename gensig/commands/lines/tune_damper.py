@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ import yaml
 from numpy.typing import NDArray
 
 from gensig.commands.console import step
-from gensig.commands.figures.damper_figure import plot_dampers
+from gensig.commands.figures.damper_figure import damper_figure
 from gensig.commands.lines.results import (
     RPM,
     DamperState,
@@ -21,13 +20,7 @@ from gensig.commands.lines.results import (
     speed_steps,
     strength_content,
 )
-from gensig.commands.output import (
-    check_outputs,
-    option_file,
-    write_option,
-    write_outputs,
-)
-from gensig.commands.request import read_configuration
+from gensig.commands.output import Answer, answered
 from gensig.driveline.engine_dampers import (
     dynamic_root_stress,
     mesh_between,
@@ -40,8 +33,8 @@ from gensig.driveline.engine_line import EngineLine, read_engine_line
 from gensig.driveline.linear.damper_tuning import tune_dampers
 from gensig.driveline.linear.dampers import TorsionalDamper
 from gensig.errors import ConfigError
+from gensig.options.configuration import Configuration
 from gensig.systems.root_strength import RootStrength
-from gensig.terminal.printing import show
 from gensig.units import from_si, to_si
 
 Array = NDArray[np.float64]
@@ -62,11 +55,9 @@ ROWS = (
 )
 
 
-def tune_damper(arguments: Namespace) -> int:
-    """Search the dampers, write the line with them as an option, and print both states."""
-    check_outputs(arguments)
-    target = option_file(arguments.out, GROUP, force=arguments.force)
-    config = read_configuration(arguments)
+@answered(group=GROUP)
+def tune_damper(config: Configuration, arguments: Namespace) -> Answer:
+    """The best dampers, forces and stress before and after, and the line with them as an option."""
     line = read_engine_line(config)
     if line.engine.pressure_decides_torque:
         raise ConfigError(
@@ -95,14 +86,12 @@ def tune_damper(arguments: Namespace) -> int:
         "after": _state(damped, mesh, strength, torque, seen.largest_force(dampers)),
     }
     content = tuning_content(states, dampers, mesh, speeds, torque)
-
-    def draw(path: Path) -> None:
-        plot_dampers(states, dampers, mesh, speeds, path)
-
-    write_outputs(arguments, content, draw)
-    _print(content)
-    write_option(target, option_text(config[GROUP], dampers, content))
-    return 0
+    return Answer(
+        content,
+        _lines(content),
+        lambda: damper_figure(states, dampers, mesh, speeds),
+        lambda: option_text(config[GROUP], dampers, content),
+    )
 
 
 def tuning_content(
@@ -202,15 +191,15 @@ def _state_content(state: DamperState) -> dict[str, Any]:
     }
 
 
-def _print(content: Mapping[str, Any]) -> None:
+def _lines(content: Mapping[str, Any]) -> Iterator[str]:
     for damper in content["dampers"]:
-        show(
+        yield (
             f"node {damper['node']:>3}: ring {damper['ring_inertia_kg_m2']:g} kg m2, "
             f"{damper['damping_nms_per_rad']:g} N m s/rad, "
             f"{damper['stiffness_nm_per_rad']:g} N m/rad"
         )
     head = f"mesh {content['mesh']}, {content['torque_nm']:g} N m at the crank"
     before, after = content["before"], content["after"]
-    show(f"{head:<36}{'before':>12}{'after':>12}")
+    yield f"{head:<36}{'before':>12}{'after':>12}"
     for label, key, form in ROWS:
-        show(f"{label:<36}{before[key]:>12{form}}{after[key]:>12{form}}")
+        yield f"{label:<36}{before[key]:>12{form}}{after[key]:>12{form}}"

@@ -62,7 +62,7 @@ def check_positive(flag: str, *values: float | None) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DataSheet:
-    """Known values of a gear pair, in the units of data sheets; pairs are of pinion and wheel.
+    """Known values of one stage of gears, in the units of data sheets; pairs are of both gears.
 
     ``bores`` are diameters in mm, ``supports`` radial stiffness in N/m, speed and torque those of
     the pinion.
@@ -82,10 +82,6 @@ class DataSheet:
     supports: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("module", "speed", "torque"):
-            check_positive(f"--{name}", getattr(self, name))
-        for name in ("widths", "bores", "supports"):
-            check_positive(f"--{name}", *(getattr(self, name) or ()))
         low, high = MODULES
         if not low <= self.module <= high:
             raise ConfigError(
@@ -100,12 +96,12 @@ class DataSheet:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearOption:
-    """The group ``gear``, a remark for each value, and the machine of these values."""
+    """The gears of one stage: their group ``gear``, a remark for each value, and the machine."""
 
+    sheet: DataSheet
     gear: dict[str, Any]
     remarks: dict[str, str]
     machine: GearPairMachine
-    is_helical: bool
 
     @property
     def pair(self) -> GearPair:
@@ -118,7 +114,7 @@ class GearOption:
             "# Written by gensig new gearbox. What is not given is derived or assumed, "
             "as each line says; put in what you know."
         ]
-        if self.is_helical:
+        if self.sheet.is_helical:
             name = self.gear["name"]
             lines.append(f"# Helical: take it with system=helical_pair gear={name}")
         lines += option_lines(self.gear, self.remarks)
@@ -152,7 +148,7 @@ class GearOption:
             "center_distance_mm": pair.center_distance * 1e3,
             "transverse_contact_ratio": pair.transverse_contact_ratio,
         }
-        if self.is_helical:
+        if self.sheet.is_helical:
             content["overlap_ratio"] = pair.overlap_ratio
         return {
             **content,
@@ -225,12 +221,8 @@ def gear_option(sheet: DataSheet) -> GearOption:
         gear[side]["support"] |= support
     machine = _machine(sheet, gear, supports="as_given")
     bearings = [bearing_for(2.0 * gear[side]["bore_radius_mm"]) for side in SIDES]
-    return GearOption(
-        gear=gear,
-        remarks=_remarks(sheet, machine, bearings),
-        machine=machine,
-        is_helical=sheet.is_helical,
-    )
+    remarks = _remarks(sheet, machine, bearings)
+    return GearOption(sheet=sheet, gear=gear, remarks=remarks, machine=machine)
 
 
 def _supports(sheet: DataSheet, gear: Mapping[str, Any]) -> list[dict[str, float]]:

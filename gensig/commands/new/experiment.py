@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gensig.commands.new.data_sheet import GearOption, check_positive
+from gensig.commands.new.stages import Gearbox
 from gensig.commands.new.tip_relief import tip_reliefs
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError
@@ -26,6 +27,8 @@ N_UNITS = 16
 CLASSES = ("healthy", "crack", "pitting", "chipped", "missing_tooth")
 GRADE_STEP = math.sqrt(2.0)  # between the limits of neighboring grades of ISO 1328-1
 LOWEST_SNR = {PLAIN: 10, REALISTIC: 5}  # dB
+LINE_RATE = 51200.0  # Hz, of sensing=geared_line_bearings
+SPUR_STEPS, HELICAL_STEPS = 5, 8  # of a sample at that rate: errors of 1e-4 and 4e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +71,11 @@ class Wishes:
         """Lowest and highest speed over the rated one."""
         return self.speed_range or SPEED_SHARES
 
+    @property
+    def shown_classes(self) -> Sequence[str]:
+        """Classes of the plan."""
+        return self.classes or CLASSES
+
 
 def read_wishes(arguments: Namespace) -> Wishes:
     """The flags of the verb that are about the experiment."""
@@ -76,39 +84,55 @@ def read_wishes(arguments: Namespace) -> Wishes:
     return Wishes(base=arguments.experiment, **values)
 
 
-def experiment_text(option: GearOption, wishes: Wishes) -> str:
+def experiment_text(gearbox: Gearbox, wishes: Wishes) -> str:
     """The file of the experiment, with the origin of each value."""
-    check_rate(option, wishes)
-    name = option.gear["name"]
-    classes = list(wishes.classes or CLASSES)
-    n_records = N_UNITS * len(classes)
+    for option in gearbox.stages:
+        _check_rate(option, wishes)
+    name, option = gearbox.sheet.name, gearbox.stages[0]
+    n_classes = len(wishes.shown_classes)
+    written = (
+        f"# Written by gensig new gearbox: {N_UNITS * n_classes} records of {name}, "
+        f"{n_classes} classes from {N_UNITS} machines. Faults are"
+    )
+    if len(gearbox.stages) > 1:
+        head = [
+            written,
+            "# drawn in shares of a tooth, on any gear. On one gear: "
+            "plan.fault_gear=as_given fault.gear=wheel",
+        ]
+        choices = [
+            f"override /system: {name}",
+            "override /sensing: geared_line_bearings  # along y at the bearings of all gears",
+        ]
+        signals = _integration(gearbox, wishes)
+        drawn = [remarked("  fault_gear: drawn", "any gear, by equal chance")]
+    else:
+        head = [f"{written} drawn in shares of a tooth."]
+        choices, signals, drawn = [], _bearings(option, wishes), []
+        if wishes.is_realistic:
+            head.append(
+                f"# All else is that of experiment={REALISTIC}, assumed; "
+                "so are the rotors of its unbalance, 1 and 4 kg."
+            )
+            choices.append(REALISTIC)
+            signals = [*_couplings(option), *_housing(wishes)]
+        if option.sheet.is_helical:
+            choices.append("override /system: helical_pair")
+        choices.append(f"override /gear: {name}")
+        if tip_reliefs(option):
+            choices.append(f"override /modification: {name}")
     lines = [
         "# @package _global_",
-        f"# Written by gensig new gearbox: {n_records} records of {name}, "
-        f"{len(classes)} classes from {N_UNITS} machines. "
-        "Faults are drawn in shares of a tooth.",
+        *head,
+        "defaults:",
+        *[f"  - {choice}" for choice in (*choices, "_self_")],
+        "",
+        *_operating(option, wishes),
+        *_quality(wishes),
+        *signals,
+        *_plan(option, wishes),
+        *drawn,
     ]
-    defaults = []
-    if wishes.is_realistic:
-        lines.append(
-            f"# All else is that of experiment={REALISTIC}, assumed; "
-            "so are the rotors of its unbalance, 1 and 4 kg."
-        )
-        defaults.append(f"  - {REALISTIC}")
-    if option.is_helical:
-        defaults.append("  - override /system: helical_pair")
-    lines += ["defaults:", *defaults, f"  - override /gear: {name}"]
-    if tip_reliefs(option):
-        lines.append(f"  - override /modification: {name}")
-    lines += ["  - _self_", ""]
-    lines += operating_lines(option, wishes)
-    if wishes.grade is not None:
-        lines += quality_lines(wishes, wishes.grade)
-    if wishes.is_realistic:
-        lines += [*_couplings(option), *_housing(wishes)]
-    else:
-        lines += _bearings(option, wishes)
-    lines += plan_lines(option, wishes, classes, n_records)
     return "\n".join(lines) + "\n"
 
 
@@ -122,7 +146,7 @@ def short_text(value: float) -> str:
     return f"{float(f'{value:.3g}'):g}"
 
 
-def check_rate(option: GearOption, wishes: Wishes) -> None:
+def _check_rate(option: GearOption, wishes: Wishes) -> None:
     """Raise ConfigError where the mesh frequency lies above the usable band."""
     fastest = wishes.speed_shares[1] * option.gear["rated_speed_rpm"] / 60.0
     mesh = fastest * option.pair.pinion.n_teeth
@@ -134,14 +158,14 @@ def check_rate(option: GearOption, wishes: Wishes) -> None:
         )
 
 
-def origin_of(given: object) -> str:
+def _origin_of(given: object) -> str:
     """The origin of a value that a flag may give."""
     if given is None:
         return "assumed"
     return "given"
 
 
-def operating_lines(option: GearOption, wishes: Wishes) -> list[str]:
+def _operating(option: GearOption, wishes: Wishes) -> list[str]:
     """The group ``operating``: the duration of a record."""
     duration, remark = wishes.duration, "given"
     if duration is None:
@@ -153,8 +177,11 @@ def operating_lines(option: GearOption, wishes: Wishes) -> list[str]:
     return ["operating:", remarked(f"  duration_s: {duration:g}", remark)]
 
 
-def quality_lines(wishes: Wishes, grade: int) -> list[str]:
-    """The group ``quality`` for a grade of ISO 1328."""
+def _quality(wishes: Wishes) -> list[str]:
+    """The group ``quality`` for a grade of ISO 1328; empty where none is given."""
+    grade = wishes.grade
+    if grade is None:
+        return []
     lines = ["quality:", remarked(f"  iso1328_grade: {grade}", "given")]
     if wishes.is_realistic:
         base = _realistic("quality")
@@ -236,10 +263,7 @@ def _housing(wishes: Wishes) -> list[str]:
     sensing, rate = _realistic("sensing"), wishes.rate
     if rate is None:
         rate = sensing["sampling_rate_hz"]
-    lines = [
-        "sensing:",
-        remarked(f"  sampling_rate_hz: {rate:g}", origin_of(wishes.rate)),
-    ]
+    lines = ["sensing:", _rate(rate, wishes)]
     if wishes.sensors is not None:
         lines.append(remarked(f"  sensors: [{', '.join(wishes.sensors)}]", "given"))
     lowest, highest = sensing["path"]["natural_frequency_hz"]
@@ -256,26 +280,52 @@ def _housing(wishes: Wishes) -> list[str]:
     return lines
 
 
+def _rate(rate: float, wishes: Wishes) -> str:
+    return remarked(f"  sampling_rate_hz: {rate:g}", _origin_of(wishes.rate))
+
+
 def _bearings(option: GearOption, wishes: Wishes) -> list[str]:
     axes = "xy"
-    if option.is_helical:
+    if option.sheet.is_helical:
         axes = "yz"
     channels = [f"{gear}_{axis}" for gear in ("pinion", "wheel") for axis in axes]
     lines = ["sensing:"]
     if wishes.rate is not None:
-        lines.append(remarked(f"  sampling_rate_hz: {wishes.rate:g}", "given"))
+        lines.append(_rate(wishes.rate, wishes))
     lines.append(remarked(f"  channels: [{', '.join(channels)}]", "at the bearings"))
     return lines
 
 
-def plan_lines(
-    option: GearOption, wishes: Wishes, classes: list[str], n_records: int
-) -> list[str]:
+def _integration(gearbox: Gearbox, wishes: Wishes) -> list[str]:
+    """The groups ``solver`` and ``sensing``: method, steps and sampling rate."""
+    least = SPUR_STEPS
+    if gearbox.sheet.is_helical:
+        least = HELICAL_STEPS
+    rate = wishes.rate or LINE_RATE
+    steps = max(least, math.ceil(least * LINE_RATE / rate))
+    lines = [
+        "solver:",
+        remarked(
+            "  backend: nystroem", "two evaluations a step, friction in every mesh"
+        ),
+        remarked(
+            f"  oversampling: {steps}",
+            f"derived: steps of 1/{steps * rate:.0f} s, errors below 1e-3",
+        ),
+    ]
+    if wishes.rate is not None:
+        lines += ["sensing:", _rate(wishes.rate, wishes)]
+    return lines
+
+
+def _plan(option: GearOption, wishes: Wishes) -> list[str]:
     """The group ``plan``: counts, classes, and ranges of the rated speed and torque."""
+    classes = wishes.shown_classes
+    n_records = N_UNITS * len(classes)
     speed, torque = option.gear["rated_speed_rpm"], option.gear["rated_torque_nm"]
     torque_shares = wishes.torque_range or TORQUE_SHARES
     lowest = LOWEST_SNR[wishes.base]
-    lines = [
+    return [
         "plan:",
         remarked(f"  n_records: {n_records}", "assumed: one of each class and machine"),
         remarked(
@@ -286,7 +336,7 @@ def plan_lines(
             "  n_gearboxes: null",
             "about the square root of n_units; 1: all sets of gears in one housing, yours",
         ),
-        remarked(f"  classes: [{', '.join(classes)}]", origin_of(wishes.classes)),
+        remarked(f"  classes: [{', '.join(classes)}]", _origin_of(wishes.classes)),
         "  vary:",
         _drawn("speed_rpm", speed, wishes.speed_shares, wishes.speed_range),
         _drawn("torque_nm", torque, torque_shares, wishes.torque_range),
@@ -295,7 +345,6 @@ def plan_lines(
             "assumed",
         ),
     ]
-    return lines
 
 
 def _drawn(key: str, rated: float, shares: Sequence[float], given: object) -> str:
@@ -304,7 +353,7 @@ def _drawn(key: str, rated: float, shares: Sequence[float], given: object) -> st
     ends = f"low: {low * rated:.6g}, high: {high * rated:.6g}"
     return remarked(
         f"    operating.{key}: {{distribution: uniform, {ends}}}",
-        f"{origin_of(given)}: {low:g} to {high:g} of the rated",
+        f"{_origin_of(given)}: {low:g} to {high:g} of the rated",
     )
 
 

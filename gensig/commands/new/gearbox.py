@@ -1,19 +1,21 @@
-"""``gensig new gearbox``: options of a gearbox from its data sheet."""
+"""``gensig new gearbox``: options of a gearbox of one stage or several from its data sheet."""
 
 from __future__ import annotations
 
 import json
-import sys
+import math
 import warnings
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from gensig.commands.new.data_sheet import DataSheet, gear_option
+from gensig.commands.new.asking import N_TEETH, ask_missing, counts_text
 from gensig.commands.new.doubts import all_doubts
 from gensig.commands.new.experiment import experiment_text, read_wishes
 from gensig.commands.new.healthy_level import read_level
+from gensig.commands.new.line_option import system_text
+from gensig.commands.new.line_tables import gears_table, shafting_table
 from gensig.commands.new.option_files import (
     check_free,
     check_name,
@@ -21,64 +23,58 @@ from gensig.commands.new.option_files import (
     next_commands,
     write_options,
 )
-from gensig.commands.new.staged_gearbox import new_staged, read_staged_sheet
+from gensig.commands.new.stages import Gearbox, read_gearbox
 from gensig.commands.new.tip_relief import modification_text
 from gensig.errors import ConfigError
+from gensig.geometry.bearing_sizes import bearing_for
 from gensig.terminal.printing import show, show_text
 
-GROUPS = ("gear", "modification", "experiment")  # written in this order
-N_TEETH = (2, 4, 6)  # two gears a stage
-
-# attribute, question, numbers of values; those that are needed come first
-NEEDED = (
-    ("teeth", "teeth of pinion and wheel, of each stage in turn", N_TEETH),
-    ("module", "normal module, mm", (1, 2, 3)),
-    ("speed", "rated speed of the pinion, r/min", (1,)),
-    ("torque", "rated torque of the pinion, N m", (1,)),
+# of ``GearOption.derived``, those that are told of each of several stages
+OF_STAGES = (
+    "pitch_line_speed_m_per_s",
+    "tooth_force_per_width_n_per_mm",
+    "nominal_root_stress_mpa",
+    "center_distance_mm",
+    "transverse_contact_ratio",
+    "overlap_ratio",
+    "mesh_frequency_hz",
+    "pinion_mass_kg",
+    "wheel_mass_kg",
+    "pinion_inertia_kg_m2",
+    "wheel_inertia_kg_m2",
+    "backlash_um",
 )
-OPTIONAL = (
-    ("helix", "helix angle, degrees", (1,)),
-    ("widths", "face widths of both, mm", (2,)),
-    ("bores", "bore diameters of both, mm", (2,)),
-    ("supports", "radial stiffness of what holds each gear, N/m", (2,)),
-)
-# asked of one stage only
-OF_ONE_STAGE = ("widths", "bores", "supports")
-PAIRS = ("widths", "bores", "supports", "profile_shifts")
 
 
 def new(arguments: Namespace) -> int:
     """Write the options of a gearbox, and print derived values and the next commands."""
     folder, name = Path(arguments.dir), arguments.name
-    files = {group: folder / group / f"{name}.yaml" for group in GROUPS}
-    check_name(name, ["experiment"], [files["experiment"]])
-    _complete(arguments)
+    check_name(name, ["experiment"], [_option(folder, "experiment", name)])
+    ask_missing(arguments)
     if len(arguments.teeth) not in N_TEETH:
         raise ConfigError(
-            f"--teeth takes {_counts(N_TEETH)} numbers, driving and driven gear of each stage, "
-            f"not {len(arguments.teeth)}"
+            f"--teeth takes {counts_text(N_TEETH)} numbers, driving and driven gear of each "
+            f"stage, not {len(arguments.teeth)}"
         )
+    groups, contents = ["gear", "modification"], pair_content
     if len(arguments.teeth) > 2:
-        return new_staged(read_staged_sheet(arguments), arguments)
-    check_name(name, GROUPS[:2], ())
+        groups, contents = ["system"], line_content
+    check_name(name, groups, ())
+    gearbox = read_gearbox(arguments)
     wishes = read_wishes(arguments)
-    option = gear_option(_sheet(arguments))
-    texts = {
-        "gear": option.text(),
-        "modification": modification_text(option),
-        "experiment": experiment_text(option, wishes),
-    }
-    texts = {group: text for group, text in texts.items() if text}
-    new_files = {files[group]: text for group, text in texts.items()}
+    texts, tables = option_texts(gearbox, folder)
+    texts["experiment"] = experiment_text(gearbox, wishes)
+    new_files = dict(tables.values())
+    new_files |= {_option(folder, group, name): text for group, text in texts.items()}
     check_free(new_files)
-    check_texts(name, texts)
-    for message in all_doubts([option]):
+    check_texts(name, texts, {key: text for key, (_, text) in tables.items()})
+    for message in all_doubts(gearbox.stages):
         warnings.warn(message, stacklevel=2)
     write_options(new_files)
+    derived = contents(gearbox)
     content: dict[str, Any] = {
         "files": [str(file) for file in new_files],
-        "derived": option.derived(),
-        "bearings": option.bearings(),
+        **derived,
         "next": next_commands(folder, name),
     }
     level = read_level(arguments, folder)
@@ -88,108 +84,99 @@ def new(arguments: Namespace) -> int:
         show_text(json.dumps(content))
         return 0
     *first, last = content["files"]
-    show(f"wrote {', '.join(first)} and {last}; each line there says where it is from")
+    origin = "each line there says where it is from"
+    if tables:
+        origin = "each says where its values are from"
+    show(f"wrote {', '.join(first)} and {last}; {origin}")
     show("with the gears as given it follows:")
-    for key, value in content["derived"].items():
-        text = "-"
-        if value is not None:
-            text = format(value, ".4g")
-        show(f"  {key:<32}{text}")
-    for side, bearing in content["bearings"].items():
-        show(f"  {side + '_bearings':<32}{bearing}")
+    show(*[f"  {key:<32}{text}" for key, text in _rows(derived)])
     if level is not None:
         show(*level.lines())
     show("next:", *[f"  {line}" for line in content["next"]])
     return 0
 
 
-def _complete(arguments: Namespace) -> None:
-    """Ask for missing values on a terminal; elsewhere raise ConfigError that names them."""
-    missing = [name for name, _, _ in NEEDED if getattr(arguments, name) is None]
-    if not missing:
-        return
-    if not sys.stdin.isatty():
-        flags = ", ".join(f"--{name}" for name in missing)
-        raise ConfigError(
-            f"missing {flags}; for instance gensig new gearbox {arguments.name} "
-            "--teeth 23 84 --module 2 --speed 1800 --torque 20"
-        )
-    for name, question, counts in (*NEEDED, *OPTIONAL):
-        if getattr(arguments, name) is not None:
-            continue
-        if name in OF_ONE_STAGE and len(arguments.teeth) > 2:
-            continue
-        if name in missing:
-            answer = _ask(question, counts, needed=True)
-        else:
-            answer = _ask(f"{question} (empty: assumed)", counts, needed=False)
-        if answer is not None and counts == (1,):
-            answer = answer[0]
-        setattr(arguments, name, answer)
+def _option(folder: Path, group: str, name: str) -> Path:
+    return folder / group / f"{name}.yaml"
 
 
-def _ask(question: str, counts: Sequence[int], *, needed: bool) -> Any:
-    """The numbers that are typed, as many as allowed; None for an empty optional answer."""
-    kind: Callable[[str], float] = float
-    if question == NEEDED[0][1]:
-        kind = int
-    while True:
-        words = _typed_line(question).replace(",", " ").split()
-        if not words and not needed:
-            return None
-        try:
-            numbers = [kind(word) for word in words]
-        except ValueError:
-            numbers = []
-        if len(numbers) in counts:
-            return numbers
-        show(f"give {_counts(counts)} number{'s' * (max(counts) > 1)}")
+def option_texts(
+    gearbox: Gearbox, folder: Path
+) -> tuple[dict[str, str], dict[str, tuple[Path, str]]]:
+    """Texts of the machine's options by group; file and text of its tables by their key."""
+    if len(gearbox.stages) == 1:
+        (stage,) = gearbox.stages
+        texts = {"gear": stage.text(), "modification": modification_text(stage)}
+        return {group: text for group, text in texts.items() if text}, {}
+    written = {"shafting": shafting_table(gearbox), "gears": gears_table(gearbox)}
+    tables = {
+        f"{key}_csv": (folder / "tables" / f"{gearbox.sheet.name}_{key}.csv", text)
+        for key, text in written.items()
+    }
+    files = {key: file for key, (file, _) in tables.items()}
+    return {"system": system_text(gearbox, files)}, tables
 
 
-def _typed_line(question: str) -> str:
-    """The answer to a question; ConfigError where the input ends, as by Ctrl-D."""
-    try:
-        return input(f"{question}: ")
-    except EOFError:
-        show("")  # the cursor stands behind the question
-        raise ConfigError(
-            f"the input ended before an answer to '{question}'; nothing is written"
-        ) from None
+def pair_content(gearbox: Gearbox) -> dict[str, Any]:
+    """What follows from the sheet of a single pair."""
+    (stage,) = gearbox.stages
+    return {"derived": stage.derived(), "bearings": stage.bearings()}
 
 
-def _counts(counts: Sequence[int]) -> str:
-    """Allowed numbers of values, as a sentence has them: 2, 4 or 6."""
-    *first, last = map(str, counts)
-    if not first:
-        return last
-    return f"{', '.join(first)} or {last}"
-
-
-def _sheet(arguments: Namespace) -> DataSheet:
-    pairs = {}
-    for name in PAIRS:
-        given = getattr(arguments, name)
-        if given is None:
-            continue
-        if len(given) > 2:
-            raise ConfigError(
-                f"--{name.replace('_', '-')} takes one number for both gears, "
-                "or two: pinion and wheel"
+def line_content(gearbox: Gearbox) -> dict[str, Any]:
+    """What follows from the sheet of several stages: of the whole, each stage and each shaft."""
+    sheet, last = gearbox.sheet, gearbox.slowdowns[-1]
+    of_stages = [
+        {**stage.derived(), "mesh_force_n": force}
+        for stage, force in zip(gearbox.stages, gearbox.mesh_forces, strict=True)
+    ]
+    keys = ["mesh_force_n", *(key for key in OF_STAGES if key in of_stages[0])]
+    return {
+        "derived": {
+            "ratio": last,
+            "output_speed_rpm": sheet.speed / last,
+            "output_torque_nm": sheet.torque * last,
+            "power_kw": of_stages[0]["power_kw"],
+        },
+        "stages": {key: [values[key] for values in of_stages] for key in keys},
+        "shafts": [
+            _shaft(sheet.speed / slowdown, sheet.torque * slowdown, diameter)
+            for slowdown, diameter in zip(
+                gearbox.slowdowns, gearbox.diameters, strict=True
             )
-        pairs[name] = (given[0], given[-1])
-    if len(arguments.module) > 1:
-        raise ConfigError(
-            f"--module takes one number for a pair of gears, not {len(arguments.module)}; "
-            "one a stage where --teeth has several stages"
+        ],
+    }
+
+
+def _shaft(speed: float, torque: float, diameter_mm: float) -> dict[str, Any]:
+    """Values of a round shaft; its stress in torsion is 16 T / (pi d^3)."""
+    return {
+        "speed_rpm": speed,
+        "torque_nm": torque,
+        "diameter_mm": diameter_mm,
+        "torsional_stress_mpa": 16e-6 * torque / (math.pi * (1e-3 * diameter_mm) ** 3),
+        "bearing": bearing_for(diameter_mm).describes,
+    }
+
+
+def _rows(content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Names and texts of what follows from the sheet."""
+    rows = [(key, _short(value)) for key, value in content["derived"].items()]
+    bearings = content.get("bearings", {})
+    rows += [(f"{side}_bearings", bearing) for side, bearing in bearings.items()]
+    for key, values in content.get("stages", {}).items():
+        cells = "  ".join(f"{_short(value):<10}" for value in values)
+        rows.append((key, cells.rstrip()))
+    for number, shaft in enumerate(content.get("shafts", ()), start=1):
+        numbers = (
+            f"{shaft['speed_rpm']:.4g} r/min, {shaft['torque_nm']:.4g} N m, "
+            f"{shaft['diameter_mm']:g} mm at {shaft['torsional_stress_mpa']:.3g} MPa"
         )
-    return DataSheet(
-        name=arguments.name,
-        teeth=tuple(arguments.teeth),
-        module=arguments.module[0],
-        speed=arguments.speed,
-        torque=arguments.torque,
-        helix_angle=arguments.helix or 0.0,
-        pressure_angle=arguments.pressure_angle,
-        addendum=arguments.addendum,
-        **pairs,
-    )
+        rows.append((f"shaft {number}", f"{numbers}, {shaft['bearing']}"))
+    return rows
+
+
+def _short(value: float | None) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.4g}"

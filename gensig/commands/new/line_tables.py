@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TypeAlias
 
-from gensig.commands.new.data_sheet import GearOption
 from gensig.commands.new.experiment import ScaledRotor, scaled_rotor, short_text
-from gensig.commands.new.stages import StagedSheet, shaft_diameters
+from gensig.commands.new.stages import Gearbox
 from gensig.commands.new.tip_relief import RELIEF_ORIGIN, tip_reliefs
 from gensig.geometry.contact import SIDES
 from gensig.systems.derived_sizes import BORE_SHARE, WIDTH_IN_MODULES
@@ -59,7 +58,7 @@ GEARS = (
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class LineNodes:
     """Numbers and names of the nodes of a gearbox of so many stages, as the tables have them."""
 
@@ -85,8 +84,9 @@ class LineNodes:
         return f"Idler gear {node - FIRST_GEAR}"
 
 
-def gears_table(sheet: StagedSheet, stages: Sequence[GearOption]) -> str:
+def gears_table(gearbox: Gearbox) -> str:
     """The table of the gears."""
+    sheet, stages = gearbox.sheet, gearbox.stages
     given = ["teeth, modules"]
     assumed = []
     for value, name, otherwise in (
@@ -103,7 +103,7 @@ def gears_table(sheet: StagedSheet, stages: Sequence[GearOption]) -> str:
     if sheet.helix_angle != 0.0:
         given.append("helix angle")
     head = [
-        f"Gears of {sheet.name}, {sheet.written_teeth} teeth, written by gensig new gearbox.",
+        f"Gears of {sheet.name}, {gearbox.written_teeth} teeth, written by gensig new gearbox.",
         f"Given: {', '.join(given)}.",
         f"Assumed: {', '.join(assumed)}.",
         f"Derived: bores. In each stage the smaller gear's shaft has {BORE_SHARE:g} of its pitch "
@@ -114,7 +114,7 @@ def gears_table(sheet: StagedSheet, stages: Sequence[GearOption]) -> str:
     reliefs = [tip_reliefs(option) for option in stages]
     if any(reliefs):
         head.append(f"Tip reliefs: {RELIEF_ORIGIN}.")
-    nodes = LineNodes(n_stages=sheet.n_stages)
+    nodes = LineNodes(len(gearbox.stages))
     rows: list[Row] = []
     for mesh, option, relief in zip(nodes.meshes, stages, reliefs, strict=True):
         for node, side in zip(mesh, SIDES, strict=True):
@@ -124,14 +124,15 @@ def gears_table(sheet: StagedSheet, stages: Sequence[GearOption]) -> str:
     return _table(head, GEARS, rows)
 
 
-def shafting_table(sheet: StagedSheet, stages: Sequence[GearOption]) -> str:
+def shafting_table(gearbox: Gearbox) -> str:
     """The table of nodes, shafts, couplings and meshes."""
-    nodes = LineNodes(n_stages=sheet.n_stages)
-    motor = scaled_rotor("motor", sheet.torque)
-    load = scaled_rotor("load", sheet.torque * sheet.slowdowns[-1])
-    speeds = [f"{1.0 / slowdown:.6g}" for slowdown in sheet.slowdowns]
+    torque, slowdowns = gearbox.sheet.torque, gearbox.slowdowns
+    nodes = LineNodes(len(gearbox.stages))
+    motor = scaled_rotor("motor", torque)
+    load = scaled_rotor("load", torque * slowdowns[-1])
+    speeds = [f"{1.0 / slowdown:.6g}" for slowdown in slowdowns]
     first, last = nodes.meshes[0][0], nodes.meshes[-1][1]
-    shafts = _shafts(sheet, stages)
+    shafts = _shafts(gearbox)
     input_half = short_text(INPUT_HALF * motor.inertia)
     output_half = short_text(OUTPUT_HALF * load.inertia)
     rows: list[Row] = [
@@ -142,13 +143,13 @@ def shafting_table(sheet: StagedSheet, stages: Sequence[GearOption]) -> str:
         | {"note": f"assumed; {shafts[0].size}"},
     ]
     for number, (driving, driven) in enumerate(nodes.meshes):
-        pinion, wheel = sheet.teeth[number]
+        pinion, wheel = gearbox.teeth[number]
         shaft = shafts[number + 1]
         rows += [
             _node(driving, nodes.gear(driving), speeds[number])
             | _edge(driving, driven, "gear_mesh")
             | {"teeth_from": pinion, "teeth_to": wheel, "center_line_deg": 0}
-            | {"backlash_um": stages[number].gear["backlash_um"]}
+            | {"backlash_um": gearbox.stages[number].gear["backlash_um"]}
             | {"note": "teeth given"},
             _node(driven, nodes.gear(driven), speeds[number + 1])
             | _edge(driven, driven + 1, "shaft", shaft.stiffness)
@@ -159,16 +160,17 @@ def shafting_table(sheet: StagedSheet, stages: Sequence[GearOption]) -> str:
         | _edge(last + 1, nodes.load, "coupling", short_text(load.stiffness)),
         _node(nodes.load, "Brake", speeds[-1], short_text(load.inertia)),
     ]
-    return _table(_shafting_head(sheet, motor, load), SHAFTING, rows)
+    return _table(_shafting_head(gearbox, motor, load), SHAFTING, rows)
 
 
 def _shafting_head(
-    sheet: StagedSheet, motor: ScaledRotor, load: ScaledRotor
+    gearbox: Gearbox, motor: ScaledRotor, load: ScaledRotor
 ) -> list[str]:
+    sheet = gearbox.sheet
     return [
-        f"A gearbox of {sheet.n_stages} stages, {sheet.written_teeth} teeth, between a motor and "
-        f"a brake: {sheet.name}, written by gensig new gearbox for {sheet.speed:g} r/min and "
-        f"{sheet.torque:g} N m of the input shaft. Given: teeth, speed, torque.",
+        f"A gearbox of {len(gearbox.stages)} stages, {gearbox.written_teeth} teeth, between a "
+        f"motor and a brake: {sheet.name}, written by gensig new gearbox for {sheet.speed:g} "
+        f"r/min and {sheet.torque:g} N m of the input shaft. Given: teeth, speed, torque.",
         f"Assumed: motor of {motor.origin}, brake of {load.origin}, bodies of one shape; couplings "
         f"of {motor.base_stiffness:g} and {load.base_stiffness:g} N m/rad there, in proportion to "
         f"the torque; coupling halves of {INPUT_HALF:g} and {OUTPUT_HALF:.2g} of motor and brake, "
@@ -208,9 +210,9 @@ class _ShaftCells:
     size: str
 
 
-def _shafts(sheet: StagedSheet, stages: Sequence[GearOption]) -> list[_ShaftCells]:
+def _shafts(gearbox: Gearbox) -> list[_ShaftCells]:
     """The shafts, the input one first; free lengths as the head of the table says."""
-    diameters = shaft_diameters(sheet)
+    diameters, stages = gearbox.diameters, gearbox.stages
     widths = [option.gear["pinion"]["face_width_mm"] for option in stages]
     between = [
         0.5 * (before + after) + diameter

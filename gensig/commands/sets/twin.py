@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from gensig.commands.console import step
-from gensig.commands.figures.twin_figure import plot_twin
+from gensig.commands.figures.panels import draw
+from gensig.commands.figures.twin_figure import twin_figure
 from gensig.commands.new.data_sheet import check_positive
 from gensig.errors import ConfigError
 from gensig.plan.request import read_request
@@ -65,7 +66,7 @@ def twin(arguments: Namespace) -> int:
         name, fitted, result, assumed, held_out_name, teeth.driving, typed
     )
     (out / "report.md").write_text(text, encoding="utf-8")
-    plot_twin(fitted, result, out / "report.png")
+    draw(twin_figure(fitted, result), out / "report.png")
     for key, value in fitted_rows(fitted, teeth.driving):
         show(f"{key:<16}{value}")
     show(*check_summary(result), verdict(result))

@@ -6,6 +6,7 @@ import json
 import re
 import shlex
 import sys
+from argparse import Namespace
 
 import pytest
 import yaml
@@ -15,11 +16,7 @@ from gensig import open_dataset
 from gensig.cli import main
 from gensig.commands.new.data_sheet import DataSheet, gear_option
 from gensig.commands.new.line_tables import shafting_table, torsional_stiffness
-from gensig.commands.new.stages import (
-    StagedSheet,
-    shaft_diameters,
-    stage_options,
-)
+from gensig.commands.new.stages import read_gearbox, shaft_diameters
 from gensig.driveline.reading import read_line_machine
 from gensig.errors import GensigError
 from gensig.plan.request import read_request
@@ -29,23 +26,43 @@ SHEET = "--teeth 29 100 36 90 --module 1.5 2 --speed 1500 --torque 10"
 NEW = f"new gearbox mine {SHEET} --dir . --no-level"
 
 
-def sheet(**changes):
-    values = {
-        "teeth": ((29, 100), (36, 90)),
-        "modules": (1.5, 2.0),
+LEFT_OUT = (
+    "widths",
+    "bores",
+    "supports",
+    "sensors",
+    "profile_shifts",
+    "helix",
+    "pressure_angle",
+    "addendum",
+)
+
+
+def gearbox(**changes):
+    """The gearbox of the flags of `SHEET`."""
+    given = {
+        "name": "a",
+        "experiment": "plain",
+        "teeth": [29, 100, 36, 90],
+        "module": [1.5, 2.0],
         "speed": 1500.0,
         "torque": 10.0,
     }
-    return StagedSheet(**{"name": "a", **values, **changes})
+    return read_gearbox(Namespace(**{**dict.fromkeys(LEFT_OUT), **given, **changes}))
 
 
 def test_one_stage_has_the_shafts_of_the_single_pair():
-    single = sheet(teeth=((29, 100),), modules=(1.5,))
-    assert shaft_diameters(single) == bores((29, 100), 1.5)
+    assert shaft_diameters([(29, 100)], [1.5]) == list(bores((29, 100), 1.5))
+
+
+def test_a_pair_is_a_gearbox_of_one_stage():
+    (stage,) = gearbox(teeth=[29, 100], module=[1.5]).stages
+    pair = DataSheet(name="a", teeth=(29, 100), module=1.5, speed=1500.0, torque=10.0)
+    assert stage.gear == gear_option(pair).gear
 
 
 def test_edges_lead_from_the_motor_to_the_load():
-    lines = shafting_table(sheet(), stage_options(sheet())).splitlines()
+    lines = shafting_table(gearbox()).splitlines()
     rows = csv.DictReader(line for line in lines if not line.startswith("#"))
     edges = [(row["edge_from"], row["edge_to"]) for row in rows if row["edge_from"]]
     assert edges == [(str(node), str(node + 1)) for node in range(1, len(edges) + 1)]
@@ -53,8 +70,8 @@ def test_edges_lead_from_the_motor_to_the_load():
 
 
 def test_a_stage_is_the_pair_of_its_own_speed_torque_and_bores():
-    stages = stage_options(sheet())
-    slowdown = sheet().slowdowns[1]
+    made = gearbox()
+    slowdown = made.slowdowns[1]
     assert slowdown == pytest.approx(100 / 29, rel=1e-15)
     second = DataSheet(
         name="a",
@@ -62,16 +79,15 @@ def test_a_stage_is_the_pair_of_its_own_speed_torque_and_bores():
         module=2.0,
         speed=1500.0 / slowdown,
         torque=10.0 * slowdown,
-        bores=tuple(shaft_diameters(sheet())[1:]),
+        bores=tuple(made.diameters[1:]),
     )
-    assert stages[1].gear == gear_option(second).gear
-    power = [option.derived()["power_kw"] for option in stages]
+    assert made.stages[1].gear == gear_option(second).gear
+    power = [stage.derived()["power_kw"] for stage in made.stages]
     assert_allclose(*power, rtol=1e-12)
 
 
 def test_a_shaft_between_two_stages_suits_both():
-    thin = sheet(teeth=((29, 100), (20, 70)), modules=(1.5, 1.5))
-    first, between, last = shaft_diameters(thin)
+    first, between, last = shaft_diameters([(29, 100), (20, 70)], [1.5, 1.5])
     assert between == bores((20, 70), 1.5)[0] < bores((29, 100), 1.5)[1]
     assert (first, last) == (bores((29, 100), 1.5)[0], bores((20, 70), 1.5)[1])
 
@@ -268,4 +284,4 @@ def test_on_a_terminal_it_asks_for_stages(gensig, tmp_path, monkeypatch):
 
 def test_an_error_of_a_stage_keeps_its_kind():
     with pytest.raises(GensigError, match="stage 1, 29/100: --module 99 must lie in"):
-        stage_options(sheet(modules=(99.0, 2.0)))
+        gearbox(module=[99.0, 2.0])

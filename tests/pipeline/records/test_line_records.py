@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose
 from record_sets import refused, run, shard
 from test_line_sets import ENGINE, TWO_STAGE
 
-from gensig.commands.figures import engine_figures
 from gensig.driveline import in_time as line_time
 from gensig.driveline import loads as line_loads
 from gensig.dynamics.backends.registry import BACKENDS, EXPLICIT_BACKEND
@@ -33,19 +32,6 @@ LIFE = (
     "life.n_setpoints=1",
     "operating.torque_nm=150",
 )
-
-
-@pytest.fixture
-def drawn(monkeypatch):
-    """Figures of lines that the command draws."""
-    figures = []
-
-    def keep(figure, path):
-        figures.append(figure)
-        path.write_bytes(b"0")
-
-    monkeypatch.setattr(engine_figures, "save", keep)
-    return figures
 
 
 @pytest.mark.parametrize(
@@ -269,7 +255,7 @@ def test_the_figure_shows_the_forces_of_every_mesh(monkeypatch, drawn, tmp_path)
     monkeypatch.setattr(line_time, "SETTLING", 0.02)
     figure = tmp_path / "response.png"
     run("forced-response", *MOTOR, "--time", 0.1, "--plot", figure)
-    panels = {axes.get_title(): axes for axes in drawn[0].axes}
+    panels = drawn[0]
     assert len(panels) == 6
     low, high = panels["Tooth force of the meshes, least to greatest"].get_ylim()
     assert low <= 0.0

@@ -176,7 +176,6 @@ def share_right(dataset, name):
         task=task,
         protocol="by_unit",
         features="basic",
-        minirocket_features=84,
         windows=dict,
         caches={},
     )

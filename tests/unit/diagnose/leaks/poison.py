@@ -34,7 +34,7 @@ AS_THEY_ARE = ("life_failed",)  # the same for all records of a life
 LEVEL_KEPT = "normalise=none"  # else no input is divided by the level of other records
 # how many shuffles are drawn, the test decides
 NO_SHUFFLE = "shuffle_control=false"
-WORDS = (*TINY_CNN, LEVEL_KEPT, NO_SHUFFLE, "minirocket_features=168", "epochs=2")
+WORDS = (*TINY_CNN, LEVEL_KEPT, NO_SHUFFLE, "epochs=2")
 RIVALS = f"baselines=[{','.join(baseline_names(Role.RIVAL))}]"
 BASELINE_JOBS = tuple(
     Job(protocols=("by_unit",), seed=None, control=control)

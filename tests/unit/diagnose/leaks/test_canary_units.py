@@ -40,7 +40,6 @@ def source():
         task=task,
         protocol="by_unit",
         features="basic",
-        minirocket_features=168,
         windows=lambda: class_jobs._windows(task, "by_unit"),
         caches={},
     )

@@ -16,8 +16,6 @@ from diagnose.training.store import load_model, model_description, save_model
 
 OPTIONS = {
     "small_cnn": ["model=cnn"],
-    "wdcnn": ["model=wdcnn"],
-    "spectrum_cnn": ["model=spectrum"],
     "order_cnn": ["model=order", "model.samples_per_tooth=16", "model.kernels=[9,5,5]"],
     "tooth_network": ["model=tooth", "model.samples_per_tooth=16"],
 }

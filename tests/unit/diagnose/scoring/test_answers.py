@@ -299,7 +299,7 @@ def test_the_best_baseline_is_chosen_on_validation_machines(study):
     validation = indicators.parts["validation"].record
     lucky = dataclasses.replace(
         indicators,
-        method="minirocket",
+        method="nearest_spectrum",
         answers=scores_of(label[indicators.record]),
         parts={
             "validation": Rows(
@@ -310,7 +310,7 @@ def test_the_best_baseline_is_chosen_on_validation_machines(study):
     answers = protocol_answers(task, settings, [*runs, lucky])
     assert answers["best_baseline"] == "indicators"
     against = {row["against"]: row["difference"] for row in answers["comparisons"]}
-    assert against["minirocket"]["mean"] < against["indicators"]["mean"]
+    assert against["nearest_spectrum"]["mean"] < against["indicators"]["mean"]
 
 
 @pytest.fixture

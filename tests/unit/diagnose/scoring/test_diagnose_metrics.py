@@ -199,11 +199,11 @@ def test_all_features_at_a_rate_that_holds_no_mesh_band_are_nan():
     assert not unknown["fm0_pinion"]
 
 
-def test_features_do_not_depend_on_threads_or_cache():
+def test_features_do_not_depend_on_the_cache():
     task = task_on(n_units=4, records_per_unit=4)
     segments = subset_segments(task, "by_unit", "train")
     cache = {}
-    first = feature_table(task, segments, cache=cache, n_threads=2).values
+    first = feature_table(task, segments, cache=cache).values
     assert len(cache) == segments.record.size
     assert_array_equal(first, feature_table(task, segments, cache=cache).values)
     assert_array_equal(first, feature_table(task, segments).values)
