@@ -315,28 +315,30 @@ def test_the_autoencoder_is_the_same_for_the_same_seed(healthy, open_study):
     assert not np.array_equal(error, reconstruction_error(other, validation))
 
 
+@pytest.fixture
+def fit_with(healthy, open_study, monkeypatch):
+    """Function that fits an autoencoder whose epochs have given errors on the validation."""
+
+    def fit(errors, patience):
+        given = iter(errors)
+        monkeypatch.setattr(
+            autoencoder, "_errors", lambda *_: torch.full((1, 1), next(given))
+        )
+        changes = {"epochs": len(errors), "patience": patience}
+        settings = dataclasses.replace(open_study[1], **changes)
+        return fit_autoencoder(*healthy, settings=settings, seed=0)
+
+    return fit
+
+
 @pytest.mark.parametrize(("patience", "kept"), [(1, 1), (0, 3)])
-def test_without_patience_the_autoencoder_runs_every_epoch(
-    patience, kept, healthy, open_study, monkeypatch
-):
-    rising = iter([1.0, 2.0, 3.0])
-    monkeypatch.setattr(
-        autoencoder, "_errors", lambda *_: torch.full((1, 1), next(rising))
-    )
-    settings = dataclasses.replace(open_study[1], epochs=3, patience=patience)
-    assert fit_autoencoder(*healthy, settings=settings, seed=0).best_epoch == kept
+def test_without_patience_the_autoencoder_runs_every_epoch(patience, kept, fit_with):
+    assert fit_with([1.0, 2.0, 3.0], patience).best_epoch == kept
 
 
-def test_an_autoencoder_that_diverges_at_its_end_is_refused_without_patience(
-    healthy, open_study, monkeypatch
-):
-    errors = iter([1.0, np.nan])
-    monkeypatch.setattr(
-        autoencoder, "_errors", lambda *_: torch.full((1, 1), next(errors))
-    )
-    settings = dataclasses.replace(open_study[1], epochs=2, patience=0)
+def test_an_autoencoder_that_diverges_at_its_end_is_refused_without_patience(fit_with):
     with pytest.raises(SimulationError, match="diverged before its last epoch"):
-        fit_autoencoder(*healthy, settings=settings, seed=0)
+        fit_with([1.0, np.nan], patience=0)
 
 
 def test_the_autoencoder_learns_and_shows_a_moment_that_it_cannot_rebuild(
