@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fake_dataset import CLASSES, FakeDataset
 from runs import FAST as QUICK
-from runs import metrics_of, refuses, rows_of, serve, settings_of
+from runs import by_unit, refuses, rows_of, serve, settings_of
 from small_studies import task_on
 
 from diagnose.baselines.base import Source
@@ -276,10 +276,6 @@ def study(tmp_path_factory):
 def complete(study):
     """Study with every control."""
     return study(*FAST, "sham=sham", "normalise=both")
-
-
-def by_unit(out):
-    return metrics_of(out)["protocols"]["by_unit"]
 
 
 def test_a_study_with_all_of_them(complete):
