@@ -2,8 +2,6 @@
 refused.
 """
 
-import re
-
 import numpy as np
 import pytest
 from closeness import assert_close
@@ -16,6 +14,7 @@ from engine_cases import (
     ratios,
     torques_of,
 )
+from refusals import refused
 
 from gensig.driveline.excitation.cycle import CYCLE
 from gensig.driveline.excitation.engine import read_engine, read_wheels
@@ -380,9 +379,8 @@ def test_torques_that_contradict_the_pressure_are_refused(tmp_path):
     ],
 )
 def test_impossible_engines_are_refused_in_one_line(path, value, message):
-    with pytest.raises(ConfigError, match=re.escape(message)) as caught:
+    with refused(message):
         torques_of(changed(path, value))
-    assert "\n" not in str(caught.value)
 
 
 def test_toothed_wheels_are_read_by_name():
@@ -401,19 +399,16 @@ def test_toothed_wheels_are_read_by_name():
         (without_node, ": missing node"),
     ):
         place = "excitation.toothed_wheels.flywheel"
-        with pytest.raises(ConfigError, match=re.escape(place + message)):
+        with refused(place + message):
             read_wheels(values)
 
 
 def test_missing_keys_are_named():
     values = option()
     del values["loads"]
-    with pytest.raises(ConfigError, match="excitation: missing loads"):
+    with refused("excitation: missing loads"):
         read_engine(values)
-    with pytest.raises(
-        ConfigError,
-        match="excitation = 3 must be a group of keys",
-    ):
+    with refused("excitation = 3 must be a group of keys"):
         read_engine(3)
 
 

@@ -297,7 +297,7 @@ def test_refusals(xiamen, monkeypatch, words, text):
 
 @pytest.mark.parametrize("gear", [3, "", None])
 def test_a_gear_has_a_name(gear):
-    with pytest.raises(FaultError, match="must be the name of a gear"):
+    with refused("must be the name of a gear", FaultError):
         MissingTooth(gear=gear, tooth=0)
 
 
