@@ -12,9 +12,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.mesh_teeth import MeshTeeth
-
-Array = NDArray[np.float64]
 
 # motions that a mesh acts on: x, y and rotation of its driving gear a and its driven gear b;
 # helical gears that move along their axes have more after them

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._layout import COLUMNS, FAR_NEAR
 from gensig.dynamics._vector import n_lanes
@@ -17,8 +18,6 @@ from gensig.dynamics.equations import Mesh
 from gensig.dynamics.helical import pitches
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.mesh.tooth_table import ToothTable, left_out_energy
-
-Array = NDArray[np.float64]
 
 MOST_PAIRS = 2  # for each distinct tooth; with more, spur teeth are stored one by one
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from gensig.arrays import Array
 from gensig.errors import SimulationError
 
-Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 ASYMMETRIC = 1e-9

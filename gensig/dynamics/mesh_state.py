@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics._layout import N_SEEN, SEEN_FORCE, SEEN_NEWEST, SEEN_PAIRS
 from gensig.dynamics.helical import pitches
 from gensig.dynamics.mesh_teeth import MeshTeeth
-
-Array = NDArray[np.float64]
 
 NO_TOOTH = -1
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import DatasetError
 from gensig.implants.blocks import Block, Cut, cut_blocks
 from gensig.implants.carrier_path import (
@@ -48,7 +49,6 @@ from gensig.signals.transfer.order_lines import Lines
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
-Array = NDArray[np.float64]
 Given = str | Path | Recording | HealthyRecording
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dataset.columns import GEAR_PINION_TURNS
 from gensig.errors import DatasetError
 from gensig.implants.gearing import DRIVEN, DRIVING
@@ -16,7 +17,6 @@ from gensig.implants.gearing import DRIVEN, DRIVING
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
-Array = NDArray[np.float64]
 
 HEALTHY, ONE_TOOTH, MANY_TEETH = "healthy", "one_tooth", "many_teeth"
 CLASSES = (HEALTHY, ONE_TOOTH, MANY_TEETH)

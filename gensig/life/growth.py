@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.life.load_history import History
-
-Array = NDArray[np.float64]
 
 WIDEST = 3.0  # standard deviations: nothing is drawn beyond
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 
-Array = NDArray[np.float64]
 MOST_BLOCKS = 200_000
 
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.faults.flank_loss import flank_area
 from gensig.faults.pitting import DistributedPitting
@@ -19,8 +19,6 @@ from gensig.geometry.contact import GearPair
 from gensig.life.growth import GrowthLaw, GrowthOptions
 from gensig.material import Material
 from gensig.units import check_limits, check_positive, unit
-
-Array = NDArray[np.float64]
 
 N_SIZES = 121
 

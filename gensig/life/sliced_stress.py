@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.material import Material
 from gensig.mesh.sliced.slice_pressure import contact_pressure
 from gensig.mesh.sliced.slices import SlicedMesh, loaded_contact
-
-Array = NDArray[np.float64]
 
 
 def sliced_contact_stress(

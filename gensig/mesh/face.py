@@ -8,13 +8,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import FaultError
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth
 from gensig.mesh._kernels import lower_envelope, share_over_slices
 from gensig.mesh.local_contact import ContactLaw
-
-Array = NDArray[np.float64]
 
 SHAPE_DECIMALS = 15  # of a metre: rounding noise does not make two slices different
 # law=paper has no gaps: flank deeper than this share of the module does not bear

@@ -6,13 +6,11 @@ import math
 import warnings
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ExtrapolationError
 from gensig.geometry.gear import Gear
 from gensig.material import Material
-
-Array = NDArray[np.float64]
 
 # rows of X = A/th_f^2 + B h_f^2 + C h_f/th_f + D/th_f + E h_f + F, in the order A..F
 COEFFICIENTS = {

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.geometry.contact import GearPair
 from gensig.mesh.options import MeshOptions
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 

@@ -14,10 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.decimation import usable_band
 from gensig.signals.indicators import crest_factor, kurtosis, rms
-
-Array = NDArray[np.float64]
 
 THIRD_OCTAVE_DB = 0.5
 INDICATORS = 0.05

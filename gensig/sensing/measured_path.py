@@ -12,11 +12,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.decimation import LOWEST_HZ, usable_band
 from gensig.errors import ConfigError
 from gensig.text.user_file import check_columns, check_rate, read_table
-
-Array = NDArray[np.float64]
 
 KEY = "sensing.path.file"
 LEAST_ROWS = 16

@@ -10,10 +10,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.response import LinearMachine
 from gensig.units import check_limits, check_ranges
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 TURN = 2.0 * math.pi

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.excitation.cams import Cam, cam_torque
 from gensig.errors import ConfigError
 from gensig.units import from_si, unit
-
-Array = NDArray[np.float64]
 
 FINE = 20_001  # points of the lift, to find where the delivery ends
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.linear.dampers import TorsionalDamper
 from gensig.driveline.linear.forced import (
     TURNS_PER_CYCLE,
@@ -27,7 +28,6 @@ from gensig.driveline.linear.forced import (
 from gensig.dynamics.linear_system import LinearSystem
 from gensig.errors import ConfigError
 
-Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 LEAST_INERTIA = 0.05  # of the largest allowed: a smaller ring is no damper

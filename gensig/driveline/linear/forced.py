@@ -16,11 +16,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.linear.matrices import LineMatrices
 from gensig.dynamics.linear_system import LinearSystem
 from gensig.errors import SimulationError
 
-Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 TURNS_PER_CYCLE = 2

@@ -13,12 +13,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.linear.shaft_line import GearMesh, LineGear, ShaftLine
 from gensig.dynamics.bodies import HOUSING, Bodies, Motion, Spring
 from gensig.dynamics.pair import Support
 from gensig.errors import ConfigError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time import _newmark_kernels as kernels
 from gensig.driveline.time._layout import (
@@ -24,7 +25,6 @@ from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import SimulationError
 from gensig.mesh.tooth_table import ToothTable, left_out_energy
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 # of a matrix that is filled, or of a triangle of its factor: from there on, all of it costs less

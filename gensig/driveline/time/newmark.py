@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time import _newmark_kernels as kernels
 from gensig.driveline.time._layout import Work
@@ -30,8 +31,6 @@ from gensig.dynamics.equations import Equations
 from gensig.dynamics.motion.at_rest import OUT_OF_BOUNDS
 from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import ConfigError, SimulationError, StepError
-
-Array = NDArray[np.float64]
 
 KINDS = ("angle", "speed", "acceleration", "mesh_force")
 BLOCK = 512  # output samples that are integrated between two passes of the low-pass

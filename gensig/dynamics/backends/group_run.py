@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics import _record_kernels
 from gensig.dynamics._layout import CENTER, N_SEEN
 from gensig.dynamics._record_kernels import LOW_PASS_PRECISION
 from gensig.dynamics._vector import aligned, n_lanes
 from gensig.dynamics.decimation import Decimator
 from gensig.dynamics.motion.dynamics import Dynamics
-
-Array = NDArray[np.float64]
-
 
 NOTHING = np.empty(0)
 NO_TAPS = np.empty(0, dtype=LOW_PASS_PRECISION)

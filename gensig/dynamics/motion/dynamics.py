@@ -11,14 +11,13 @@ from typing import Protocol, final
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.equations import Equations, OverAngle
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.motion.at_rest import OUT_OF_BOUNDS, at_rest
 from gensig.dynamics.motion.course import Course, ShaftTorque
 from gensig.dynamics.motion.motion_checks import check_system, check_torques
 from gensig.errors import SimulationError
-
-Array = NDArray[np.float64]
 
 LONGEST_SETTLING = 0.45  # s
 MOST_NAMED = 3  # degrees of freedom in an error

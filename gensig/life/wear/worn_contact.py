@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import GeometryError, SimulationError
 from gensig.life.wear.archard import FlankPath
 from gensig.mesh.sliced.slices import (
@@ -22,7 +23,6 @@ from gensig.mesh.sliced.slices import (
     settled_contact,
 )
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 # of a mesh in several slices, whose slices pass the nodes at other phases than these

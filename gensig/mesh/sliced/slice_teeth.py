@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
@@ -24,8 +25,6 @@ from gensig.mesh.pair_table import (
     structural_compliance,
 )
 from gensig.mesh.root_crack import crack_compliance
-
-Array = NDArray[np.float64]
 
 NO_FLANK = 1.0  # m; gap of a missing flank, finite for interpolation
 NARROWEST = 1e-6  # of the face; edges closer than this are merged

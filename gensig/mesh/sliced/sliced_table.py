@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import FaultError, GeometryError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import Tooth, healthy_tooth
@@ -38,8 +39,6 @@ from gensig.mesh.sliced.slices import (
 from gensig.mesh.smooth_table import smooth
 from gensig.mesh.thermal.paper_growth import PaperGrowth
 from gensig.mesh.tooth_table import GearTeeth, TablePart, ToothTable
-
-Array = NDArray[np.float64]
 
 N_CHORDS = 8
 N_TRIED, N_SAMPLES = 32, 24  # depths and positions at which chords are chosen

@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError, ExtrapolationError, GeometryError
 from gensig.geometry.contact import GearPair, corner_gap_by_pinion
 from gensig.geometry.tooth import Tooth, healthy_tooth
@@ -37,8 +38,6 @@ from gensig.mesh.sliced.slice_teeth import (
 )
 from gensig.mesh.thermal.paper_growth import PaperGrowth
 from gensig.mesh.thermal.paper_teeth import paper_terms
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

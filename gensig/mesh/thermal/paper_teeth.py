@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth_profile import tooth_profile
@@ -24,8 +25,6 @@ from gensig.mesh.thermal.paper_growth import (
     hot_outline,
     shift_angle,
 )
-
-Array = NDArray[np.float64]
 
 PHASES_AT_ONCE = 256
 TERMS = ("bending", "shear", "axial", "foundation")

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.signals.mesh_motion import Teeth
 from gensig.signals.resampling import PASS_SHARE
-
-Array = NDArray[np.float64]
 
 # bins to either side of a line in which a Hann window leaves 99.9 % of its power
 SPREAD = 2

@@ -8,11 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.signals.recording import Recording
 from gensig.signals.transfer.order_lines import Lines, band_centers, band_sums
-
-Array = NDArray[np.float64]
 
 SURE = 3.0  # standard deviations above the floor from which the power of lines counts
 

@@ -19,7 +19,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.signals.separation import FloatArray, GearTurns
+from gensig.arrays import FloatArray
+from gensig.signals.separation import GearTurns
 
 MEMORY = 1.2e-3  # s of the inverse filter; assumed, 61 samples at 51.2 kHz
 RIDGE = 1e-3  # of the mean power, as white noise that is added to the lines; assumed

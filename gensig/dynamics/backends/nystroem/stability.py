@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gensig.arrays import Array
 
 LONGEST = 4.0  # |lambda| h beyond which no step is stable
 RATIO_STEPS = 64  # damping ratios from 0 to 1 at which the limit is computed
