@@ -9,13 +9,13 @@ from closeness import assert_close
 from line_tools import IMPLICIT
 from refusals import refused
 
+from gensig import load_system
 from gensig.driveline.teeth import felt_there, is_tabulated
 from gensig.driveline.time.newmark import LineSolver
 from gensig.errors import FaultError
 from gensig.faults.registry import read_faults
 from gensig.plan.request import read_request
 from gensig.record.inputs import draw_start
-from gensig.record.machines import read_machine
 from gensig.sensing.chain import Sensing
 from gensig.sensing.manufacturing import (
     GearErrors,
@@ -46,7 +46,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*mean tooth forces:UserWarning"
 
 @lru_cache(maxsize=16)
 def machine(*words):
-    return read_machine(read_request(list(words)).config)
+    return load_system(*words)
 
 
 def crack(gear, tooth=0, depth=1.5):

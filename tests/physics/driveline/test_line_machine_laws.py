@@ -9,11 +9,11 @@ import numpy as np
 from closeness import assert_close
 from engine_cases import SPEED, TORQUE
 
+from gensig import load_system
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.running import Governor, running_line, steady_course
 from gensig.driveline.time.newmark import LineSolver
 from gensig.plan.request import read_request
-from gensig.record.machines import read_machine
 from gensig.sensing.manufacturing import nominal_gearbox
 from gensig.systems.run import Run
 
@@ -41,7 +41,7 @@ def engine(*words):
 
 
 def machine(*words):
-    return read_machine(read_request([*RECORDS, *words]).config)
+    return load_system(*RECORDS, *words)
 
 
 def deviations(line, nodes, settling, duration=0.15):

@@ -11,14 +11,13 @@ import pytest
 from closeness import assert_close
 from line_tools import IMPLICIT
 
+from gensig import load_system
 from gensig.driveline.line_gears import gear_dof
 from gensig.driveline.mesh_phase import start_phases
 from gensig.driveline.running import Governor, running_line, steady_course
 from gensig.driveline.time.newmark import LineSolver
 from gensig.dynamics.motion.course import LineCourse, ShaftTorque
 from gensig.dynamics.response import GEAR_AXES
-from gensig.plan.request import read_request
-from gensig.record.machines import read_machine
 from gensig.systems.lead_in import earlier, simulate_with_lead_in
 from gensig.systems.run import Run, Start
 
@@ -33,7 +32,7 @@ RATE = 10240.0
 
 @lru_cache(maxsize=8)
 def machine(*words):
-    return read_machine(read_request(list(words)).config)
+    return load_system(*words)
 
 
 def unfiltered(system):

@@ -11,12 +11,12 @@ from closeness import assert_close
 from line_tools import IMPLICIT
 from refusals import refused
 
+from gensig import load_system
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.time.newmark import LineSolver, integrate_line
 from gensig.errors import StepError
 from gensig.faults.registry import read_faults
 from gensig.plan.request import read_request
-from gensig.record.machines import read_machine
 from gensig.systems.run import Run, Start
 
 RPM = np.pi / 30.0
@@ -52,7 +52,7 @@ def driven(*words):
 
 
 def machine(*words):
-    return read_machine(read_request([*RECORDS, *words]).config)
+    return load_system(*RECORDS, *words)
 
 
 def simulated(record, *faults, start=None):

@@ -10,6 +10,7 @@ from closeness import assert_close
 from numpy.testing import assert_array_equal
 from refusals import refused
 
+from gensig import load_faults
 from gensig.driveline.loads import LEAST_TORQUE, SHARED, greatest_loads
 from gensig.faults.registry import read_faults
 from gensig.life.crack_growth import crack_growth
@@ -175,7 +176,7 @@ def test_the_contact_stress_of_slices_is_the_nominal_one_without_a_helix(spur):
 
 def test_pits_of_a_helical_pair_come_by_their_slices(helical):
     machine, laws, _ = helical
-    pits = read_faults(read_request(["fault=distributed_pitting"]).config["fault"])[0]
+    pits = load_faults("fault=distributed_pitting")[0]
     options = laws["distributed_pitting"]
     misaligned = parts(*HELICAL, "modification.misalignment_um=10")[0]
     even, tilted = (

@@ -10,8 +10,8 @@ import pytest
 from closeness import assert_close
 from refusals import refused
 
+from gensig import load_faults
 from gensig.errors import FaultError
-from gensig.faults.registry import read_faults
 from gensig.mesh import pair_table
 from gensig.mesh.load_distribution import (
     PERFECT,
@@ -38,7 +38,7 @@ def table_of(*words):
 
 
 def faults_of(*words):
-    return read_faults(read_request(["system=helical_pair", *words]).config["fault"])
+    return load_faults("system=helical_pair", *words)
 
 
 def at_rest(table, roll, force, meeting=PERFECT):
