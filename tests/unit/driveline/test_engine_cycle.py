@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from refusals import refused
+from refusals import given, refused
 
 from gensig.driveline.excitation.cycle import (
     CYCLE,
@@ -147,23 +147,17 @@ def test_a_delay_of_whole_points_moves_and_changes_nothing():
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [
-        ({"bore": 0.0}, "bore_mm = 0 must be positive"),
-        ({"stroke": -0.1}, "stroke_mm = -100 must be positive"),
-        (
-            {"crank_to_rod_ratio": 1.0},
-            "crank_to_rod_ratio = 1 must lie between 0 and 1",
-        ),
-        ({"compression_ratio": 1.0}, "compression_ratio = 1 must be above 1"),
-        (
-            {"reciprocating_mass": -1.0},
-            "reciprocating_mass_kg = -1 must not be negative",
-        ),
-    ],
+    {
+        "bore=0.0": "bore_mm = 0 must be positive",
+        "stroke=-0.1": "stroke_mm = -100 must be positive",
+        "crank_to_rod_ratio=1.0": "crank_to_rod_ratio = 1 must lie between 0 and 1",
+        "compression_ratio=1.0": "compression_ratio = 1 must be above 1",
+        "reciprocating_mass=-1.0": "reciprocating_mass_kg = -1 must not be negative",
+    }.items(),
 )
 def test_cylinders_that_cannot_be_are_refused(change, message):
     with refused(message):
-        replace(CYLINDER, **change)
+        replace(CYLINDER, **given(change))
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import io
 
 import pytest
 from numpy.testing import assert_allclose
-from refusals import refused
+from refusals import given, refused
 
 from gensig.driveline.drive_line import read_drive_line
 from gensig.driveline.linear.stiffness_range import check_stiffness_range
@@ -332,48 +332,30 @@ def test_an_inertia_that_rounding_hides_is_named(line_of):
 
 @pytest.mark.parametrize(
     ("keys", "message"),
-    [
-        (
-            {"shafting_csv": None},
-            "system.shafting_csv is required: give system.shafting_csv=FILE and system.gears_csv",
+    {
+        "shafting_csv=None": (
+            "system.shafting_csv is required: give system.shafting_csv=FILE and system.gears_csv"
         ),
-        (
-            {"shafting_csv": "not_there.csv"},
-            "not_there.csv cannot be read: No such file",
+        "shafting_csv='not_there.csv'": "not_there.csv cannot be read: No such file",
+        "gears_csv=None": "node 3 has no gear to derive it from; give one, or system.gears_csv",
+        "backlash_um=-1": "system.backlash_um = -1 must not be negative",
+        "lateral=1": "system.lateral = 1 is not true or false",
+        "loss_factor={'shaft':3,'coupling':0,'gear_mesh':0}": (
+            "system.loss_factor.shaft = 3 must lie in 0..2"
         ),
-        (
-            {"gears_csv": None},
-            "node 3 has no gear to derive it from; give one, or system.gears_csv",
+        "loss_factor={'shaft':0}": "system.loss_factor: missing coupling, gear_mesh",
+        "campbell={'low_speed_rpm':9,'high_speed_rpm':3,'orders':[1]}": (
+            "low_speed_rpm must lie between"
         ),
-        ({"backlash_um": -1}, "system.backlash_um = -1 must not be negative"),
-        ({"lateral": 1}, "system.lateral = 1 is not true or false"),
-        (
-            {"loss_factor": {"shaft": 3, "coupling": 0, "gear_mesh": 0}},
-            "system.loss_factor.shaft = 3 must lie in 0..2",
-        ),
-        (
-            {"loss_factor": {"shaft": 0}},
-            "system.loss_factor: missing coupling, gear_mesh",
-        ),
-        (
-            {"campbell": {"low_speed_rpm": 9, "high_speed_rpm": 3, "orders": [1]}},
-            "low_speed_rpm must lie between",
-        ),
-        (
-            {"campbell": {"low_speed_rpm": 0, "high_speed_rpm": 3, "orders": [0]}},
-            "all positive",
-        ),
-        (
-            {"campbell": {"low_speed_rpm": 0, "high_speed_rpm": 3, "orders": []}},
-            "all positive",
-        ),
-        ({"support": None}, "system.support = None must be a group of keys"),
-        ({"latral": True}, "system: unknown key 'latral'; did you mean 'lateral'"),
-    ],
+        "campbell={'low_speed_rpm':0,'high_speed_rpm':3,'orders':[0]}": "all positive",
+        "campbell={'low_speed_rpm':0,'high_speed_rpm':3,'orders':[]}": "all positive",
+        "support=None": "system.support = None must be a group of keys",
+        "latral=True": "system: unknown key 'latral'; did you mean 'lateral'",
+    }.items(),
 )
 def test_a_mistake_in_the_keys_is_one_line(line_of, keys, message):
     with refused(message):
-        line_of(**keys)
+        line_of(**given(keys))
 
 
 @pytest.mark.parametrize(

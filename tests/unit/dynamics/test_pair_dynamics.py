@@ -9,7 +9,7 @@ import pytest
 from closeness import assert_close
 from core_runs import MISSING, QUICK
 from lane_tools import laws
-from refusals import refused
+from refusals import given, refused
 
 from gensig.dynamics.integrator import (
     MOST_BYTES,
@@ -240,64 +240,26 @@ class TestRefusals:
                 recorded(xiamen, running, **changes)
 
     @pytest.mark.parametrize(
-        ("part", "changes", "text"),
-        [
-            (
-                "solver",
-                {"oversampling": 0},
-                "solver.oversampling = 0 must lie in 2..256",
-            ),
-            (
-                "solver",
-                {"oversampling": 257},
-                "solver.oversampling = 257 must lie in 2..256",
-            ),
-            (
-                "solver",
-                {"precision": "float16"},
-                "'float16'; allowed: float64, float32",
-            ),
-            (
-                "solver",
-                {"max_error": 0.0},
-                "= 0 must lie in 1e-6..1, or be null",
-            ),
-            (
-                "support",
-                {"stiffness_x": -1.0},
-                "stiffness_x_n_per_m = -1 must not be negative",
-            ),
-            (
-                "support",
-                {"damping_y": -1.0},
-                "damping_y_ns_per_m = -1 must not be negative",
-            ),
-            (
-                "operating",
-                {"speed": 0.0},
-                "operating.speed_rpm = 0 must be positive",
-            ),
-            (
-                "operating",
-                {"torque": -5.0},
-                "operating.torque_nm = -5 must be positive",
-            ),
-            (
-                "operating",
-                {"duration": -1.0},
-                "operating.duration_s = -1 must be positive",
-            ),
-            (
-                "operating",
-                {"drive_damping_ratio": 0.0},
-                "drive_damping_ratio = 0 must lie in",
-            ),
-        ],
+        ("change", "text"),
+        {
+            "solver.oversampling=0": "solver.oversampling = 0 must lie in 2..256",
+            "solver.oversampling=257": "solver.oversampling = 257 must lie in 2..256",
+            "solver.precision='float16'": "'float16'; allowed: float64, float32",
+            "solver.max_error=0.0": "= 0 must lie in 1e-6..1, or be null",
+            "support.stiffness_x=-1.0": "stiffness_x_n_per_m = -1 must not be negative",
+            "support.damping_y=-1.0": "damping_y_ns_per_m = -1 must not be negative",
+            "operating.speed=0.0": "operating.speed_rpm = 0 must be positive",
+            "operating.torque=-5.0": "operating.torque_nm = -5 must be positive",
+            "operating.duration=-1.0": "operating.duration_s = -1 must be positive",
+            "operating.drive_damping_ratio=0.0": "drive_damping_ratio = 0 must lie in",
+        }.items(),
     )
-    def test_options(self, xiamen, part, changes, text):
+    def test_options(self, xiamen, change, text):
+        ((place, value),) = given(change).items()
+        part, key = place.split(".")
         holder = xiamen.pinion if part == "support" else xiamen
         with refused(text):
-            replace(getattr(holder, part), **changes)
+            replace(getattr(holder, part), **{key: value})
 
 
 class TestRecord:
