@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.arrays import Array
+from gensig.arrays import Array, Integers
 from gensig.errors import DatasetError
 from gensig.implants.blocks import Block, Cut, cut_blocks
 from gensig.implants.carrier_path import (
@@ -70,10 +70,10 @@ class Implants:
     """
 
     acceleration: NDArray[np.float32]
-    label: NDArray[np.int64]
+    label: Integers
     class_names: tuple[str, ...]
     gain_db: Array
-    block: NDArray[np.int64]
+    block: Integers
     blocks: tuple[Block, ...]
     draws: tuple[Draw, ...]
     sampling_rate: float

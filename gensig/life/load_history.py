@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gensig.arrays import Array
+from gensig.arrays import Array, Integers
 from gensig.errors import ConfigError
 
 MOST_BLOCKS = 200_000
@@ -28,7 +27,7 @@ class History:
 
     begin: Array
     end: Array
-    setpoint: NDArray[np.int64]
+    setpoint: Integers
     speed: Array
     torque: Array
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gensig.arrays import Array
+from gensig.arrays import Array, Integers
 from gensig.errors import FaultError
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth
@@ -39,7 +38,7 @@ class FlankContacts:
 
     center: Array
     relative_radius: Array
-    of_phase: NDArray[np.int64]
+    of_phase: Integers
     content: tuple[bytes, bytes]
 
 
@@ -104,7 +103,7 @@ def _envelope(
     return gap[0]
 
 
-def _shapes(standing_back: Array) -> tuple[Array, NDArray[np.int64], Array]:
+def _shapes(standing_back: Array) -> tuple[Array, Integers, Array]:
     """Distinct shapes of the rows without their offsets, index of each row's shape, and offsets.
 
     Slices of a flank that is only moved or tilted across the face share their envelope.

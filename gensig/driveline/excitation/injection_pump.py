@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gensig.arrays import Array
+from gensig.arrays import Array, Flags
 from gensig.driveline.excitation.cams import Cam, cam_torque
 from gensig.errors import ConfigError
 from gensig.units import from_si, unit
@@ -81,7 +80,7 @@ class Plunger:
         )
 
     def pressure(
-        self, lift: Array, rising: NDArray[np.bool_], volume: float, speed_share: float
+        self, lift: Array, rising: Flags, volume: float, speed_share: float
     ) -> Array:
         """Pressure over the plunger, (point,) Pa, at lifts of the cam in m.
 

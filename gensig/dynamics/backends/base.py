@@ -6,10 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from gensig.arrays import Array
+from gensig.arrays import Array, Flags
 from gensig.dynamics._layout import MOST_PAIRS as MOST_PAIRS
 from gensig.dynamics._layout import N_SEEN as N_SEEN
 from gensig.dynamics._layout import SEEN_FORCE as SEEN_FORCE
@@ -81,7 +78,7 @@ class Motions:
     seen: Sequence[Array]
     mean_speed: Array
     contact_loss: Array
-    finite: NDArray[np.bool_]
+    finite: Flags
 
 
 class Backend(ABC):

@@ -9,9 +9,8 @@ from functools import cached_property
 from typing import Protocol, final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gensig.arrays import Array
+from gensig.arrays import Array, Complex
 from gensig.dynamics.equations import Equations, OverAngle
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.motion.at_rest import OUT_OF_BOUNDS, at_rest
@@ -33,7 +32,7 @@ class Vibration(Protocol):
         """Orders of the reference, (order,)."""
 
     @property
-    def angle(self) -> NDArray[np.complex128]:
+    def angle(self) -> Complex:
         """Complex amplitudes, (dof, order) rad or m."""
 
 
@@ -188,7 +187,7 @@ class Dynamics:
         return forces
 
     @cached_property
-    def stiff_rates(self) -> NDArray[np.complex128]:
+    def stiff_rates(self) -> Complex:
         """Eigenvalues that the steps must follow: of meshes stiffer than their mean, 1/s."""
         return self.equations.rates(STIFFER * self.mesh_stiffness)
 

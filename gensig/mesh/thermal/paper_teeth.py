@@ -6,9 +6,8 @@ The equations hold for a slice; per width they are those of any slice (eqs. 16, 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gensig.arrays import Array
+from gensig.arrays import Array, Integers
 from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth_profile import tooth_profile
 from gensig.material import Material
@@ -147,9 +146,7 @@ def _cartesian(radius: Array, half_angle: Array) -> tuple[Array, Array]:
     return radius * np.cos(half_angle), radius * np.sin(half_angle)
 
 
-def _up_to(
-    cells: Array, cell: NDArray[np.int64], abscissa: Array, x_load: Array
-) -> Array:
+def _up_to(cells: Array, cell: Integers, abscissa: Array, x_load: Array) -> Array:
     """Sums of cells up to the load, (phase,); ``cells`` (phase, cell), the load in ``cell``."""
     row = np.arange(len(cell))
     running = np.concatenate([np.zeros((len(cells), 1)), np.cumsum(cells, axis=1)], 1)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.arrays import Array
+from gensig.arrays import Array, Flags
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._layout import COLUMNS, GAP, GAP_SLOPE
 from gensig.dynamics._vector import aligned
@@ -258,7 +258,7 @@ def _bodies(lanes: Sequence[Lane], precision: str) -> Mapping[str, Any]:
     }
 
 
-def _is_entry(matrices: Array) -> NDArray[np.bool_]:
+def _is_entry(matrices: Array) -> Flags:
     """True where symmetric matrices (lane, row, column) hold more than what is rounded."""
     diagonal = np.sqrt(np.abs(np.einsum("lii->li", matrices)))
     least = ROUNDED * diagonal[:, :, None] * diagonal[:, None, :]
