@@ -356,7 +356,7 @@ class LineMachine(Machine):
         machine = replace(
             self, operating=replace(self.operating, speed=speed, torque=torque)
         )
-        line = machine.line(Run(system=machine, faults=()))
+        line = machine.line(Run(system=machine))
         force = "mesh_force", machine.mesh_number
         motion, angle = line_motion(machine, line, loads.SECONDS, [force])
         return angle, motion.signals[force]

@@ -196,7 +196,6 @@ def test_relieved_gears_shake_less_along_the_line_of_action(machine):
     runs = [
         Run(
             system=replace(system, modification=modification),
-            faults=(),
         )
         for modification in (PLAIN, system.long_relief())
     ]

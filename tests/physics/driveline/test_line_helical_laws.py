@@ -252,7 +252,7 @@ def test_meshes_stand_where_the_crank_puts_them(tooth, phase):
     start = Start(tooth_pinion=tooth, tooth_wheel=3, phase=phase)
     turned = record.crank_angle(start)
     rolls = start_rolls(drive, turned)
-    line = record.line(Run(system=record, faults=(), start=start)).dynamics
+    line = record.line(Run(system=record, start=start)).dynamics
 
     off = [start_phases(drive, turned)[record.mesh_number] - phase]
     for teeth, pair, roll in zip(line.teeth, drive.pairs, rolls, strict=True):

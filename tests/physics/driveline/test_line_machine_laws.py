@@ -138,7 +138,7 @@ def test_a_fine_wheel_without_errors_shows_the_shaft():
         )
     ]
     record = machine(*words, "sensing.channels=[flywheel_speed]")
-    line = record.line(Run(system=record, faults=()))
+    line = record.line(Run(system=record))
     motion = line.run(
         SOLVER,
         duration=0.08,
@@ -157,7 +157,7 @@ def test_supports_of_a_gearbox_reach_the_lateral_line():
         "system.lateral=true",
         "sensing.channels=[wheel_x, wheel_y]",
     )
-    run = Run(system=record, faults=())
+    run = Run(system=record)
     nominal = record.line(run)
     stiffer = replace(
         nominal_gearbox(2),

@@ -101,7 +101,6 @@ def record(machine):
             [
                 Run(
                     system=system,
-                    faults=(),
                     start=Start(phase=0.3),
                 )
             ]
