@@ -17,9 +17,8 @@ from gensig.life.crack_growth import crack_growth
 from gensig.life.growth import grow
 from gensig.life.life_options import read_life
 from gensig.life.load_history import given_history
-from gensig.life.pit_growth import contact_stress
+from gensig.life.pit_growth import contact_stress, sliced_contact_stress
 from gensig.life.sliced_crack import sliced_crack_growth
-from gensig.life.sliced_stress import sliced_contact_stress
 from gensig.mesh.sliced.slice_energy import structure_energy
 from gensig.mesh.sliced.slices import loaded_contact
 from gensig.plan.request import read_request
