@@ -89,7 +89,7 @@ def test_every_natural_frequency_is_listed_or_counted(n_modes):
         modes=tuple(modes),
     )
     figure = run_up_figure(run_up, "a run-up")
-    key = figure.rows[1][-1].marks[-1].values[0]
+    key = figure.rows[0][-1].marks[-1].values[0]
     assert key.startswith("natural frequencies, Hz")
     listed = [mode.name for mode in modes if f"\n{mode.name}  " in key]
     left = re.search(r"\nand (\d+) more to (\d+)$", key)
