@@ -36,7 +36,7 @@ LOST_SHARE = 0.02  # of the bearing field; less is the edge of the reliefs
 LEAST_SHARE = 0.05
 
 
-@answered
+@answered()
 def transmission_error(config: Configuration, _: Namespace) -> Answer:
     """Static transmission error under load."""
     with one_line_warnings("gensig"):
