@@ -6,7 +6,7 @@ VENV ?= .venv
 PIP_ARGS ?=
 DEMO ?= demo
 # two test processes of one thread: half the time, 2 GB of memory each; files in the order of tests/conftest.py
-PYTEST_ARGS ?= -n 2 --dist loadfile --no-loadscope-reorder
+PYTEST_ARGS ?= -n 2 --dist loadfile --no-loadscope-reorder --durations 10
 BIN := $(VENV)/bin
 
 .PHONY: demo test check wheel-test docs figures clean

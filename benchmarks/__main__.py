@@ -16,7 +16,6 @@ from collections.abc import Sequence
 
 from benchmarks import _end_to_end, _rates
 from benchmarks._measure import begin, print_figures, write_json
-from benchmarks._ross_time import stored_rate
 from gensig.dynamics._vector import LANES, PRECISIONS, n_lanes
 from gensig.dynamics.backends.nystroem.machine_lanes import group_kind
 from gensig.dynamics.backends.nystroem.method import core_of
@@ -24,22 +23,11 @@ from gensig.dynamics.backends.nystroem.method import core_of
 RECORD = "import gensig; gensig.load_system('solver.precision={}').simulate()"
 PER_CORE = "simulated s per core-s"
 TWO_STAGE = "two-stage box, compiled core {} x5"
-SCALAR, RK45 = (
-    "scalar Numba RK4 x5, the same law",
-    "solve_ivp RK45, right-hand side compiled",
-)
-RK45_NUMPY, KERNEL, RECORDS = (
-    "solve_ivp RK45, NumPy around the compiled law",
-    "compiled core {} x5",
-    "records per core-s",
-)
-# what was aimed at, as ratios in one run; kernels against scalar Numba, the rest as named
+RK45 = "solve_ivp RK45, NumPy around the compiled law"
+KERNEL, RECORDS = "compiled core {} x5", "records per core-s"
+# what was aimed at, as ratios in one run
 GOALS = {
-    "pair over scalar Numba, float64": 14.0,
-    "pair over scalar Numba, float32": 22.0,
-    "two-stage box over scalar Numba of a pair, float64": 7.0,
-    "end to end over solve_ivp RK45, NumPy around the law": 2000.0,
-    "end to end over ROSS run_time_response": 4000.0,
+    "end to end over solve_ivp RK45": 2000.0,
     "share of the kernel's rate reached, float64": 0.6,
     "two workers over one, float64": 1.9,
 }
@@ -64,27 +52,9 @@ def kernels(runs: int, precisions: Sequence[str] = PRECISIONS) -> dict[str, floa
     for precision in precisions:
         machines = boxes[: n_lanes(precision)]
         works[TWO_STAGE.format(precision)] = _rates.kernel(machines, 5, precision, core)
-    works[SCALAR] = _rates.scalar(pairs[:LANES], 5)
-    works |= _rates.scipy_works(pairs[0])
-    result = _rates.rates(
-        works, 4 * runs
-    )  # they are short: many turns cost little, and one of them is undisturbed
-    if (ross := stored_rate()) is not None:
-        result["ROSS run_time_response x1, as stored, by way of scalar Numba"] = (
-            ross * result[SCALAR]
-        )
-    return result
-
-
-def same_law() -> dict[str, float]:
-    """Relative differences of the accelerations of scalar and compiled code, 20 Hz to 20 kHz."""
-    eight = _rates.machines(n=LANES)
-    return {
-        f"x{_rates.SAME_OVERSAMPLING}, required below {_rates.SAME:g}": _rates.check_same_law(
-            eight
-        ),
-        "x5, where only the scalar code takes kinks apart": _rates.difference(eight, 5),
-    }
+    works[RK45] = _rates.scipy_work(pairs[0])
+    # they are short: many turns cost little, and one of them is undisturbed
+    return _rates.rates(works, 4 * runs)
 
 
 def start_up(runs: int, *, quick: bool) -> dict[str, float]:
@@ -122,30 +92,18 @@ def ratios(
     result = {}
     for precision in ends:
         pair = rates[KERNEL.format(precision)]
-        result[f"pair over scalar Numba, {precision}"] = pair / rates[SCALAR]
         box = rates[TWO_STAGE.format(precision)]
-        result[f"two-stage box over scalar Numba of a pair, {precision}"] = (
-            box / rates[SCALAR]
-        )
         result[f"pair over two-stage box, {precision}"] = pair / box
     end = ends["float64"][RECORDS]
     if "float32" in ends:
         result["float32 over float64, end to end"] = ends["float32"][RECORDS] / end
-    result["end to end over solve_ivp RK45, right-hand side compiled"] = (
-        end / rates[RK45]
-    )
-    result["end to end over solve_ivp RK45, NumPy around the law"] = (
-        end / rates[RK45_NUMPY]
-    )
+    result["end to end over solve_ivp RK45"] = end / rates[RK45]
     for precision, values in ends.items():
         result[f"share of the kernel's rate reached, {precision}"] = (
             values[RECORDS] / rates[KERNEL.format(precision)]
         )
         one, two = (values[_end_to_end.wall_name(workers)] for workers in (1, 2))
         result[f"two workers over one, {precision}"] = two / one
-    for name, value in rates.items():
-        if name.startswith("ROSS"):
-            result["end to end over ROSS run_time_response"] = end / value
     return result
 
 
@@ -166,17 +124,11 @@ def main() -> None:
 
     def show(section: str, values: dict[str, float]) -> None:
         sections[section] = values
-        over = values.get(SCALAR)
-        print_figures(
-            section,
-            values,
-            *([lambda value: f"{value / over:.4g} x scalar"] if over else []),
-        )
+        print_figures(section, values)
 
     precisions, size = PRECISIONS, _end_to_end.WHOLE
     if arguments.quick:
         precisions, size = ("float64",), _end_to_end.QUICK
-    show("difference of scalar code and compiled core", same_law())
     show(f"integrators, {PER_CORE}", kernels(arguments.runs, precisions))
     rates, ends = sections[f"integrators, {PER_CORE}"], {}
     for precision in precisions:

@@ -52,7 +52,7 @@ TWIN_OF = "healthy__load50"
 TRAINING = (
     "window_samples=1600",
     "stride_samples=1600",
-    "model=spectrum",
+    "model=cnn",
     "epochs=20",
     "epoch_fraction=1",
 )

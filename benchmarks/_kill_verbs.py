@@ -20,8 +20,7 @@ import numpy as np
 from benchmarks._file_operations import Ended, kill_at, refuse_from, run_command
 from gensig.cli import main as gensig
 from gensig.dataset.exports.export import FORMATS
-from gensig.dataset.folder.layout import MANIFEST
-from gensig.dataset.folder.manifest import read_manifest
+from gensig.dataset.folder.layout import MANIFEST, read_manifest
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.reader import open_dataset
 from gensig.implants import implant_plan

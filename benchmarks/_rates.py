@@ -1,6 +1,6 @@
 """Simulated seconds per second of one core.
 
-The compiled core, scalar Numba, and scipy on the same equations.
+The compiled core, and scipy on the same equations.
 """
 
 from __future__ import annotations
@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from benchmarks import _classical_scheme, _scalar
+from benchmarks import _classical_scheme
 from benchmarks._measure import in_turn
 from gensig.dynamics._layout import N_LAW
 from gensig.dynamics._vector import LANES, n_lanes
 from gensig.dynamics.backends.group_run import Core, GroupRun
 from gensig.dynamics.backends.nystroem.machine_lanes import pack
 from gensig.dynamics.backends.nystroem.method import THREE_PAIRS
-from gensig.dynamics.decimation import decimator, in_band_error
 from gensig.dynamics.lanes import fill_lanes
 from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.dynamics.pair import RunningPair
@@ -40,11 +39,6 @@ SAMPLING_RATE = 51200.0
 CHANNELS = np.arange(4)  # x and y of both gears
 SETTLING, TIMED = 0.02, 0.1  # s
 PER_CALL = 1280  # steps, so that what is stored stays in the cache
-SAME_OVERSAMPLING, SAME = (
-    16,
-    1e-3,
-)  # steps per sample at which both codes must agree, and how well
-SCIPY = ("RK45", "DOP853", "LSODA")
 SCIPY_SECONDS, SCIPY_RTOL, SCIPY_ATOL = 0.01, 1e-6, 1e-12
 
 
@@ -134,128 +128,21 @@ def kernel(
     return work, len(lanes) * n_calls * PER_CALL * step
 
 
-def scalar_run(
-    running: RunningPair, oversampling: int, seconds: float
-) -> tuple[Array, Array]:
-    """State (2, dof) and mean accelerations (step, channel) of the scalar code, from rest at time
-    0.
+def scipy_work(running: RunningPair) -> Work:
+    """``solve_ivp`` RK45 at rtol 1e-6 from the static deflection on.
+
+    The right-hand side is NumPy around the product's own compiled law.
     """
-    step = 1.0 / (SAMPLING_RATE * oversampling)
-    state = np.array([running.dynamics.static_start(0.0), np.zeros(len(running.dofs))])
-    means = np.empty((round(seconds / step), len(CHANNELS)))
-    machine = _scalar.machine(running)
-    lowest = _scalar.integrate(machine, state, step, 0, len(means), CHANNELS, means)
-    if lowest < -machine.mesh.backlash:
-        raise ValueError(
-            f"the approach fell to {lowest:.3g} m, to the back flanks, which the scalar "
-            "code has not"
-        )
-    return state, means
-
-
-def scalar(all_of: list[RunningPair], oversampling: int) -> Work:
-    """Scalar Numba, one settled record after the other, with the same four channels."""
-    step = 1.0 / (SAMPLING_RATE * oversampling)
-    means, first = (
-        np.empty((round(TIMED / step), len(CHANNELS))),
-        round(SETTLING / step),
-    )
-    settled = [
-        (_scalar.machine(one), scalar_run(one, oversampling, SETTLING)[0])
-        for one in all_of
-    ]
+    start = np.concatenate(running.dynamics.start(0.0))
+    slope = _right_hand_side(running)
 
     def work() -> None:
-        for machine, state in settled:
-            _scalar.integrate(
-                machine, state.copy(), step, first, len(means), CHANNELS, means
-            )
+        solve_ivp(slope, (0.0, SCIPY_SECONDS), start, rtol=SCIPY_RTOL, atol=SCIPY_ATOL)
 
-    return work, len(all_of) * len(means) * step
+    return work, SCIPY_SECONDS
 
 
-def difference(all_of: list[RunningPair], oversampling: int) -> float:
-    """Largest relative difference of both codes' accelerations, 20 Hz to 20 kHz, over 20 ms from
-    the same start.
-    """
-    step, low_pass = 1.0 / (SAMPLING_RATE * oversampling), decimator(oversampling)
-    n_steps = (round(SETTLING * SAMPLING_RATE) + 2 * low_pass.margin) * oversampling + 1
-    lanes = [one.dynamics for one in all_of]
-    group = THREE_PAIRS.pack(lanes, step, "float64", (0.0, 0.0))
-    run = GroupRun(lanes, CHANNELS, "float64", THREE_PAIRS)
-    for lane, dynamics in enumerate(lanes):
-        run.begin(group, lane, *dynamics.start(0.0))
-    ours = np.empty((n_steps, len(CHANNELS), LANES))
-    THREE_PAIRS.integrate(
-        group,
-        run.state.ravel(),
-        run.lost,
-        run.fresh,
-        step,
-        0,
-        n_steps,
-        CHANNELS,
-        ours.ravel(),
-        0,
-        np.empty(0),
-        -1,
-        1,
-        np.empty(0),
-        run.work,
-        run.wide,
-        run.near,
-    )
-    theirs = np.stack(
-        [scalar_run(one, oversampling, n_steps * step)[1] for one in all_of], axis=-1
-    )
-    return float(
-        in_band_error(low_pass.apply(theirs), low_pass.apply(ours), SAMPLING_RATE).max()
-    )
-
-
-def check_same_law(all_of: list[RunningPair]) -> float:
-    """The difference at a step fine enough for either, refused where it is none of the step's."""
-    result = difference(all_of, SAME_OVERSAMPLING)
-    if not result < SAME:
-        raise AssertionError(
-            f"scalar and compiled code differ by {result:.2g} at x{SAME_OVERSAMPLING}"
-        )
-    return result
-
-
-def scipy_works(running: RunningPair) -> dict[str, Work]:
-    """``solve_ivp`` at rtol 1e-6 from a settled state on, by method.
-
-    The right-hand side is the scalar code, compiled whole with the machine in it; once more it
-    is NumPy around the
-    product's own compiled law, as one would write it without.
-    """
-    settled = scalar_run(running, SAME_OVERSAMPLING, SETTLING)[0].ravel()
-    compiled, plain = (
-        _scalar.right_hand_side(_scalar.machine(running)),
-        _numpy_right_hand_side(running),
-    )
-    if not np.allclose(
-        compiled(SETTLING, settled), plain(SETTLING, settled), rtol=1e-6, atol=1e-6
-    ):
-        raise AssertionError("the right-hand sides given to solve_ivp differ: two laws")
-
-    def solve(slope: RightHandSide, method: str) -> Work:
-        span = (SETTLING, SETTLING + SCIPY_SECONDS)
-        given = {"method": method, "rtol": SCIPY_RTOL, "atol": SCIPY_ATOL}
-        return lambda: solve_ivp(slope, span, settled, **given), SCIPY_SECONDS
-
-    result = {
-        f"solve_ivp {method}, right-hand side compiled": solve(compiled, method)
-        for method in SCIPY
-    }
-    return {
-        **result,
-        "solve_ivp RK45, NumPy around the compiled law": solve(plain, "RK45"),
-    }
-
-
-def _numpy_right_hand_side(running: RunningPair) -> RightHandSide:
+def _right_hand_side(running: RunningPair) -> RightHandSide:
     group, system, direction = (
         pack([running.dynamics], 1e-6),
         running.equations,

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from benchmarks._realism_results import RECORDING
 from benchmarks._realism_sets import (
     CONTROLS,
     RECORDING_DURATION,
@@ -28,7 +29,6 @@ from gensig.report.realism import (
     APART,
     NOT_APART,
     NOTHING,
-    RECORDING,
     WITHOUT,
     Comparison,
     judge,

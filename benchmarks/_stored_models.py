@@ -16,7 +16,7 @@ from diagnose.networks.domain import METHOD, QUANTILE, TENSOR
 from diagnose.networks.registry import build_model
 from diagnose.recordings.registry import shipped_network
 from diagnose.recordings.tooth_classifier import ARRAYS, TOOTH_KIND
-from diagnose.training.life_facts import LifeFacts
+from diagnose.scoring.hours import LifeFacts
 from diagnose.training.model_files import MODEL_SCHEMA_VERSION
 from diagnose.training.remaining_life import LifeNetwork
 from diagnose.training.store import ModelDescription, save_model

@@ -26,6 +26,7 @@ from diagnose.data.windows import IntArray, WindowSet
 from diagnose.networks.calibration import calibration_scores
 from diagnose.networks.domain import distances, fit_domain
 from diagnose.networks.registry import input_of
+from diagnose.scoring.intervals import interval_text
 from diagnose.scoring.metrics import (
     confusion_by_unit,
     over_records,
@@ -139,7 +140,7 @@ class Judged:
     """
 
     title: str
-    score: Any
+    score: dict[str, Any]
     recalls: dict[str, float]
     known: float
     calibration_error: float
@@ -148,7 +149,7 @@ class Judged:
 
     def row(self) -> str:
         """Row of the table of the card."""
-        score = f"{self.score.mean:.2f} [{self.score.low:.2f}, {self.score.high:.2f}]"
+        score = interval_text(self.score)
         shares = [f"{share:.2f}" for share in self.recalls.values()]
         cells = [self.title, str(self.n_machines), score, *shares]
         cells += [f"{self.known:.2f}", f"{self.calibration_error:.3f}"]
@@ -267,10 +268,7 @@ def describe(
         temperature=training.temperature,
         test_score={
             "balanced_accuracy": {
-                "mean": judged.score.mean,
-                "low": judged.score.low,
-                "high": judged.score.high,
-                "too_few": judged.score.too_few,
+                key: judged.score[key] for key in ("mean", "low", "high", "too_few")
             },
             "chance": 1.0 / len(judged.recalls),
             "n_records": judged.n_records,

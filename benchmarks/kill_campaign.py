@@ -42,7 +42,7 @@ from pathlib import Path
 
 from benchmarks._kill_verbs import kill_verbs
 from gensig.cli import main as gensig
-from gensig.dataset.folder.manifest import read_manifest
+from gensig.dataset.folder.layout import read_manifest
 from gensig.dataset.folder.verify import verify
 
 SET = (

@@ -170,7 +170,7 @@ def _row(
     )
     return Row(
         case=case,
-        score=(score.mean, score.low, score.high),
+        score=(score["mean"], score["low"], score["high"]),
         recalls=dict(zip(names, recall(counts.sum(axis=0)).tolist(), strict=True)),
         seconds=seconds,
     )

@@ -33,6 +33,7 @@ from benchmarks._realism_recording import (
     recording_indicators,
     simulated_indicators,
 )
+from benchmarks._realism_results import RESULTS, read_results, table, write_results
 from benchmarks._realism_sets import (
     ADDED,
     CONTROLS,
@@ -46,16 +47,7 @@ from benchmarks._realism_sets import (
 )
 from benchmarks._realism_values import quantities, read_table
 from gensig.errors import GensigError
-from gensig.report.realism import (
-    RESULTS,
-    Comparison,
-    RangeKey,
-    compare,
-    read_ranges,
-    read_results,
-    table,
-    write_results,
-)
+from gensig.report.realism import Comparison, RangeKey, compare, read_ranges
 from gensig.version import __version__
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -1,11 +1,8 @@
-"""``python -m benchmarks.ross``: gensig's mesh beside ROSS's, quantity by quantity, and what
-ROSS's motion costs.
+"""``python -m benchmarks.ross``: gensig's mesh beside ROSS's, quantity by quantity.
 
 Makes ROSS its own virtual environment (about 1.5 GB, kept for the next run), asks it for its
 values, stores them with its version in ``tests/reference/data/ross.csv``, and prints both
-programs' values as Markdown tables. What the differences come from: ``docs/validation.md``. ROSS's
-``run_time_response`` with the same gears is timed too; what it takes is stored in
-``benchmarks/ross_time.json``.
+programs' values as Markdown tables. What the differences come from: ``docs/validation.md``.
 """
 
 from __future__ import annotations
@@ -24,7 +21,6 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import _gensig_values as ours
-from benchmarks import _ross_time
 from gensig.execution.base import THREAD_VARIABLES
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -64,16 +60,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             python = make_environment(
                 options.env, options.ross_version, shlex.split(options.pip_args)
             )
-            if not options.time_only:
-                run_ross(python, options.output)
-            time_ross(python)
+            run_ross(python, options.output)
         stored, version = read_values(options.output)
     except (PeerError, OSError) as error:
         print(f"benchmarks.ross: {error}", file=sys.stderr)
         return 1
-    print("\n".join(_ross_time.lines()))
-    if options.time_only:
-        return 0
     print(f"\nROSS {version}; ratios are gensig over ROSS\n")
     for pair, values in stored.items():
         print(
@@ -168,19 +159,6 @@ def run_ross(python: Path, output: Path) -> None:
         )
         output.parent.mkdir(parents=True, exist_ok=True)
         output.write_bytes(answered.read_bytes())
-
-
-def time_ross(python: Path) -> None:
-    """Time ROSS's time response, on one thread, and store what it took."""
-    with tempfile.TemporaryDirectory() as folder:
-        asked, answered = Path(folder) / "job.json", Path(folder) / "time.json"
-        asked.write_text(json.dumps(_ross_time.job()))
-        script = Path(__file__).with_name("_ross_time_response.py")
-        _run(
-            [str(python), "-I", str(script), str(asked), str(answered)],
-            "ROSS gave no time response",
-        )
-        _ross_time.store(json.loads(answered.read_text()))
 
 
 def read_values(path: Path) -> tuple[StoredValues, str]:
@@ -377,11 +355,6 @@ def _parser() -> argparse.ArgumentParser:
         "--stored",
         action="store_true",
         help="compare with the stored values, without ROSS",
-    )
-    parser.add_argument(
-        "--time-only",
-        action="store_true",
-        help="only time the time response, or show what is stored",
     )
     parser.add_argument(
         "--all",

@@ -10,7 +10,6 @@ from typing import Any
 
 from diagnose.baselines.base import Role
 from diagnose.baselines.features import FEATURES
-from diagnose.baselines.minirocket import KERNELS
 from diagnose.baselines.registry import baseline_names
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration, Section
@@ -34,7 +33,6 @@ LEAST = {
     "n_seeds_control": 1,
     "n_bootstrap": 1,
     "batch_size": 2,
-    "minirocket_features": len(KERNELS),
 }
 OWN = "training"  # section of a network's file that gives a `Schedule`
 LISTS = ("protocols", "classes", "channels", "test_channels", "seeds")
@@ -164,7 +162,6 @@ class TrainSettings:
     sham: str | None
     baselines: tuple[str, ...]
     features: str
-    minirocket_features: int
     n_bootstrap: int
     n_threads: int | None
     device: str

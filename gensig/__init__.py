@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
     from gensig.faults.base import Fault
     from gensig.implants.implanting import Given
-    from gensig.production.fault_pairs import FaultPairs
+
+    # named by diagnose, which imports nothing else of the physics
+    from gensig.production.fault_pairs import FaultPairs as FaultPairs
+    from gensig.production.fault_pairs import PairCell as PairCell
     from gensig.production.streaming import RecordStream
     from gensig.systems.base import Machine
 
@@ -140,7 +143,7 @@ def generate(
     gensig.errors.GensigError    for anything that cannot be used, for a shard that fails, and with
             ``reuse`` for a folder that is another data set
     """
-    from gensig.production.making import make_folder
+    from gensig.production.folder import make_folder
 
     make_folder(
         overrides,

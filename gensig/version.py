@@ -3,4 +3,4 @@
 A change of bits is a change of version.
 """
 
-__version__ = "0.25.0"
+__version__ = "0.26.0"

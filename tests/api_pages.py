@@ -2,6 +2,7 @@
 
 import inspect
 import re
+import textwrap
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -24,10 +25,16 @@ def page(path: Path) -> str:
 
 def _lines(name: str) -> list[str]:
     result = _resolved(name)
-    lines = [f"- `{name}`: {_summary(result)}"]
+    text = f"- `{name}`: {_summary(result)}"
     if isinstance(result, ModuleType):
-        lines += [f"    - `{own}`: {_summary(value)}" for own, value in _public(result)]
-    return lines
+        text += f" Names: {', '.join(f'`{own}`' for own in _public(result))}."
+    return textwrap.wrap(
+        text.removesuffix(" Names: ."),
+        100,
+        subsequent_indent="  ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def _resolved(name: str) -> Any:
@@ -38,10 +45,10 @@ def _resolved(name: str) -> Any:
         return getattr(_resolved(parent), own)
 
 
-def _public(module: ModuleType) -> list[tuple[str, Any]]:
-    """Functions and classes that the module itself defines, in its order."""
+def _public(module: ModuleType) -> list[str]:
+    """Names of functions and classes that the module itself defines, in its order."""
     return [
-        (name, value)
+        name
         for name, value in vars(module).items()
         if not name.startswith("_")
         and (inspect.isfunction(value) or inspect.isclass(value))

@@ -47,7 +47,6 @@ def page() -> str:
     lines = [f"{head}{END_OF_HEAD}", "|---|---|"]
     lines += [f"| {status} | {text} |" for status, text in EXITS.items()]
     lines += ["", "Beside these, or in place of them:", ""]
-    lines += ["| command | status | meaning |", "|---|---|---|"]
     summaries = {
         "gensig": {name: verb.summary for name, verb in VERBS.items()},
         "diagnose": diagnose.cli.VERBS,
@@ -56,7 +55,7 @@ def page() -> str:
     for command, verbs in summaries.items():
         for name in verbs:
             for status, text in exits[command](name).items():
-                lines.append(f"| `{command} {name}` | {status} | {text} |")
+                lines.append(f"- `{command} {name}`, {status}: {text}")
     by_name = parsers()
     for command, verbs in summaries.items():
         lines += ["", f"## {command}"]

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from hypothesis import settings
+from parts import Parts
 
 import gensig.compilation
 from gensig.dynamics.motion.dynamics import Dynamics
@@ -40,6 +41,10 @@ FIRST = (
     "tests/pipeline/",
     "tests/unit/dataset/",
 )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(Parts())
 
 
 @pytest.hookimpl(trylast=True)

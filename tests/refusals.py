@@ -1,7 +1,9 @@
-"""Refusals in one line."""
+"""Refusals in one line, and tables of them."""
 
 import re
+from collections.abc import Mapping
 from contextlib import contextmanager
+from typing import Any
 
 import pytest
 
@@ -14,3 +16,8 @@ def refused(words, error=ConfigError):
     with pytest.raises(error, match=re.escape(words)) as caught:
         yield caught
     assert "\n" not in str(caught.value)
+
+
+def refusals(table: Mapping[str, Any]) -> pytest.MarkDecorator:
+    """One test a row of a table: ``words`` of the message -> what is ``given``."""
+    return pytest.mark.parametrize(("words", "given"), table.items(), ids=[*table])

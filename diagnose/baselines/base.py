@@ -62,7 +62,6 @@ class Source:
     ----------
     task, protocol : records, labels and split
     features : key of `diagnose.baselines.features.FEATURES`
-    minirocket_features : number of features
     windows : returns the windows of each subset
     caches : by name of the input, filled and used, so that protocols share common values
     """
@@ -70,7 +69,6 @@ class Source:
     task: Task
     protocol: str
     features: str
-    minirocket_features: int
     windows: Callable[[], Mapping[str, WindowSet]]
     caches: dict[str, Cache]
 
@@ -86,6 +84,19 @@ class Source:
     def segments(self, subset: str) -> Segments:
         """Stretches of records of a subset."""
         return subset_segments(self.task, self.protocol, subset)
+
+    def tables(
+        self,
+        name: str,
+        table: Callable[[Task, Segments, Cache], FeatureTable],
+        subsets: Iterable[str] = SUBSETS,
+    ) -> Parts:
+        """Tables of the stretches of subsets, with the cache of a name."""
+        cache = self.caches.setdefault(name, {})
+        return Parts.of(
+            lambda subset: table(self.part(subset), self.segments(subset), cache),
+            subsets,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -44,13 +44,12 @@ FURTHER = (
     *_of_gears("fm0", "m6a", "m8a", "energy_ratio", "na4", "nb4"),
 )
 FEATURES = {"basic": INDICATORS, "all": INDICATORS + FURTHER}
-BLOCK = 32  # stretches in memory at once
 BURST_WINDOW = (
     0.005  # s, assumed: shorter than a turn, longer than the decay of a gearbox mode
 )
 # channels, record, first sample and sample after the last -> values
 Key = tuple[tuple[str, ...], int, int, int]
-Cache = dict[Key, FloatArray]
+Cache = dict[Key, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,42 +147,32 @@ def _or_unknown(
 def feature_table(
     task: Task,
     segments: Segments,
+    cache: Cache | None = None,
     *,
     features: str = "basic",
-    cache: Cache | None = None,
-    n_threads: int = 1,
 ) -> FeatureTable:
     """Indicators of every stretch, one column per channel and indicator.
 
     Parameters
     ----------
     task, segments : stretches of the signals
-    features : of `FEATURES`
     cache : filled and used, so that protocols share common values; for the same features
-    n_threads : stretches computed at once; the values do not depend on it
+    features : of `FEATURES`
     """
-    if cache is None:
-        cache = {}
     rotation = known_rotation(task)
     rate = task.dataset.sampling_rate
 
-    def compute(key: Key) -> FloatArray:
+    def values(key: Key) -> FloatArray:
         return indicators(
-            signals[key],
+            read_signal(task, *key[1:]),
             rate,
             rotation.frequencies(key[1]),
             rotation.n_teeth(key[1]),
             features=features,
         ).ravel()
 
-    keys = keys_of(task, segments)
-    missing = [key for key in keys if key not in cache]
-    with ThreadPoolExecutor(max_workers=n_threads) as pool:
-        for first in range(0, len(missing), BLOCK):
-            block = missing[first : first + BLOCK]
-            signals = {key: read_signal(task, *key[1:]) for key in block}
-            cache.update(zip(block, pool.map(compute, block), strict=True))
-    return table_of(task, segments, [cache[key] for key in keys], FEATURES[features])
+    names = of_channels(task, FEATURES[features])
+    return stretch_table(task, segments, names, values, cache)
 
 
 def keys_of(task: Task, segments: Segments) -> list[Key]:
@@ -191,17 +180,38 @@ def keys_of(task: Task, segments: Segments) -> list[Key]:
     return [(task.channel_names, *row) for row in segments.rows()]
 
 
-def table_of(
+def of_channels(task: Task, names: Sequence[str]) -> tuple[str, ...]:
+    """Columns of these names for each channel."""
+    return tuple(
+        "/".join(pair) for pair in itertools.product(task.channel_names, names)
+    )
+
+
+def stretch_table(
     task: Task,
     segments: Segments,
-    rows: Sequence[FloatArray],
-    of_channel: Sequence[str],
+    names: tuple[str, ...],
+    values: Callable[[Key], FloatArray],
+    cache: Cache | None = None,
 ) -> FeatureTable:
-    """Table of rows of the stretches, with the columns `of_channel` for each channel."""
-    columns = itertools.product(task.channel_names, of_channel)
+    """Table with one row a stretch.
+
+    Parameters
+    ----------
+    task, segments : stretches of the signals
+    names : of the columns
+    values : returns the row (column,) of a stretch
+    cache : filled and used
+    """
+    if cache is None:
+        cache = {}
+    keys = keys_of(task, segments)
+    for key in keys:
+        if key not in cache:
+            cache[key] = values(key)
     return FeatureTable(
-        values=np.stack(rows),
-        names=tuple("/".join(names) for names in columns),
+        values=np.stack([cache[key] for key in keys]),
+        names=names,
         label=task.labels()[segments.record],
         record=segments.record,
     )

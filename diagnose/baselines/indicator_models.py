@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import final
 
 from diagnose.baselines.base import Input, MethodText, Parts, Role, Source
 from diagnose.baselines.chosen_model import ChosenModelBaseline
-from diagnose.baselines.features import LEVEL, FeatureTable, feature_table
+from diagnose.baselines.features import LEVEL, feature_table
 
 
 def indicator_tables(source: Source) -> Parts:
     """Indicators of every stretch of the signal."""
-    cache = source.caches.setdefault(INDICATOR_INPUT.name, {})
-
-    def table(subset: str) -> FeatureTable:
-        segments, features = source.segments(subset), source.features
-        task = source.part(subset)
-        return feature_table(task, segments, features=features, cache=cache)
-
-    return Parts.of(table, source.subsets)
+    table = partial(feature_table, features=source.features)
+    return source.tables(INDICATOR_INPUT.name, table, source.subsets)
 
 
 INDICATOR_INPUT = Input(name="indicators", make=indicator_tables)

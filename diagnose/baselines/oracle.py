@@ -14,14 +14,15 @@ from diagnose.baselines.features import (
     INDICATORS,
     Cache,
     FeatureTable,
+    Key,
     indicators,
-    keys_of,
     known_rotation,
-    table_of,
+    of_channels,
+    stretch_table,
 )
 from diagnose.data.inputs import NetworkInput
-from diagnose.data.windows import Segments, Task, WindowSet, read_signal
-from diagnose.networks.domain import band_levels
+from diagnose.data.windows import FloatArray, Segments, Task, WindowSet, read_signal
+from diagnose.networks.domain import N_BANDS, band_levels
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
@@ -70,20 +71,17 @@ def oracle_table(task: Task, segments: Segments, cache: Cache) -> FeatureTable:
     """
     rotation = known_rotation(task)
     rate = task.dataset.sampling_rate
-    keys = keys_of(task, segments)
-    for key in keys:
-        if key in cache:
-            continue
+
+    def values(key: Key) -> FloatArray:
         signal = read_signal(task, *key[1:]).astype(float)
         twin = read_signal(task, *key[1:], name=TWIN).astype(float)
         three = (signal, twin, signal - twin)
         frequency, n_teeth = rotation.frequencies(key[1]), rotation.n_teeth(key[1])
         columns = [indicators(part, rate, frequency, n_teeth) for part in three]
         faulty, sound, rest = (band_levels(part) for part in three)
-        cache[key] = np.concatenate([*columns, rest, faulty - sound], axis=1).ravel()
-    n_columns = cache[keys[0]].size // len(task.channel_names)
-    n_bands = (n_columns - 3 * len(INDICATORS)) // 2
-    bands = [f"band_{band}" for band in range(n_bands)]
+        return np.concatenate([*columns, rest, faulty - sound], axis=1).ravel()
+
+    bands = [f"band_{band}" for band in range(N_BANDS)]
     groups = {
         ("record", "twin", "difference"): INDICATORS,
         ("difference", "ratio"): bands,
@@ -94,17 +92,12 @@ def oracle_table(task: Task, segments: Segments, cache: Cache) -> FeatureTable:
         for part in parts
         for name in names
     ]
-    return table_of(task, segments, [cache[key] for key in keys], of_channel)
+    return stretch_table(task, segments, of_channels(task, of_channel), values, cache)
 
 
 def twin_tables(source: Source) -> Parts:
     """Tables of records and twins in every subset."""
-    cache = source.caches.setdefault(TWIN_INPUT.name, {})
-
-    def table(subset: str) -> FeatureTable:
-        return oracle_table(source.part(subset), source.segments(subset), cache)
-
-    return Parts.of(table)
+    return source.tables(TWIN_INPUT.name, oracle_table)
 
 
 TWIN_INPUT = Input(name="with_twins", make=twin_tables)

@@ -14,13 +14,13 @@ from diagnose.baselines.features import (
     Cache,
     FeatureTable,
     Key,
-    keys_of,
     known_rotation,
+    stretch_table,
 )
 from diagnose.baselines.oracle import TWIN
 from diagnose.baselines.tooth_features import LEVELS, NEIGHBORS, levels_of_teeth
 from diagnose.baselines.tooth_models import turns_of, why_no_turns
-from diagnose.data.windows import FloatArray, Segments, Task, read_signal
+from diagnose.data.windows import FloatArray, Segments, Task
 
 N_LARGEST = 3
 
@@ -79,43 +79,21 @@ def difference_features(record: FloatArray, twin: FloatArray) -> FloatArray:
 
 def difference_table(task: Task, segments: Segments, cache: Cache) -> FeatureTable:
     """`difference_features` of both gears in every stretch; ``cache`` is filled and used."""
-    rotation, rate = known_rotation(task), float(task.dataset.sampling_rate)
+    rotation = known_rotation(task)
 
-    def features(key: Key) -> FloatArray:
-        mesh_frequency = rotation.mesh_frequency(key[1])
-        driving, driven = rotation.n_teeth(key[1]).values()
-        record, twin = (
-            turns_of(
-                read_signal(task, *key[1:], name=name),
-                rate,
-                mesh_frequency,
-                (driving, driven),
-            )
-            for name in ("acceleration", TWIN)
-        )
+    def values(key: Key) -> FloatArray:
+        record = turns_of(task, rotation, key)
+        twin = turns_of(task, rotation, key, name=TWIN)
         gears = zip(record, twin, strict=True)
         return np.concatenate([difference_features(*both) for both in gears])
 
-    keys = keys_of(task, segments)
-    for key in keys:
-        if key not in cache:
-            cache[key] = features(key)
-    return FeatureTable(
-        values=np.stack([cache[key] for key in keys]),
-        names=tuple(f"{gear}/{name}" for gear in GEARS for name in GEAR_FEATURES),
-        label=task.labels()[segments.record],
-        record=segments.record,
-    )
+    names = tuple(f"{gear}/{name}" for gear in GEARS for name in GEAR_FEATURES)
+    return stretch_table(task, segments, names, values, cache)
 
 
 def difference_tables(source: Source) -> Parts:
     """Differences from the twins in every subset."""
-    cache = source.caches.setdefault(DIFFERENCE_INPUT.name, {})
-
-    def table(subset: str) -> FeatureTable:
-        return difference_table(source.part(subset), source.segments(subset), cache)
-
-    return Parts.of(table)
+    return source.tables(DIFFERENCE_INPUT.name, difference_table)
 
 
 DIFFERENCE_INPUT = Input(

@@ -7,25 +7,22 @@ from diagnose.baselines.indicator_models import (
     IndicatorModel,
     IndicatorModelWithoutLevel,
 )
-from diagnose.baselines.minirocket import MiniRocket
 from diagnose.baselines.nearest_spectrum import NearestSpectrum
 from diagnose.baselines.oracle import OracleIndicators
 from diagnose.baselines.oracle_teeth import OracleTeeth
 from diagnose.baselines.probe import MetadataProbe, ResultProbe, RotationProbe
 from diagnose.baselines.rms_threshold import RmsThreshold
 from diagnose.baselines.sound_record import SoundRecord
-from diagnose.baselines.tooth_models import ToothLogistic, ToothTrees
+from diagnose.baselines.tooth_models import ToothLogistic
 
 BASELINES: dict[str, type[Baseline]] = {
     baseline.text.name: baseline
     for baseline in (
         ToothLogistic,
-        ToothTrees,
         IndicatorModel,
         IndicatorModelWithoutLevel,
         RmsThreshold,
         NearestSpectrum,
-        MiniRocket,
         SoundRecord,
         MetadataProbe,
         RotationProbe,

@@ -14,12 +14,14 @@ from diagnose.baselines.base import Input, MethodText, Parts, Role, Source
 from diagnose.baselines.chosen_model import ChosenModelBaseline
 from diagnose.baselines.features import (
     GEARS,
+    Cache,
     FeatureTable,
     Key,
     keys_of,
     known_rotation,
 )
 from diagnose.data.references import ReferenceKind, references
+from diagnose.data.teeth import START
 from diagnose.data.windows import FloatArray, IntArray, Segments, Task, read_signal
 from gensig.errors import ConfigError
 from gensig.signals.resampling import PASS_SHARE
@@ -32,8 +34,6 @@ _BANDS = range(len(BANDS))
 OF_CHANNEL = ("rise", "fall")
 # Log ratio of the largest tooth and the median one, of the channels' mean square changes.
 OF_ALL = "outstanding"
-START = ("start_phase", "start_tooth_pinion", "start_tooth_wheel")
-Levels = dict[Key, dict[str, FloatArray]]
 
 
 def chosen_references(task: Task) -> IntArray:
@@ -61,7 +61,7 @@ def chosen_references(task: Task) -> IntArray:
     raise ConfigError(f"baseline sound_record: {text}, or leave that baseline out")
 
 
-def sound_record_table(task: Task, segments: Segments, known: Levels) -> FeatureTable:
+def sound_record_table(task: Task, segments: Segments, known: Cache) -> FeatureTable:
     """Changes of the teeth of both gears, stretch by stretch, with the columns `_names`.
 
     The reference is the whole healthy record, also for a stretch that is part of a record.
@@ -97,12 +97,7 @@ def sound_record_table(task: Task, segments: Segments, known: Levels) -> Feature
 
 def sound_record_tables(source: Source) -> Parts:
     """Changes of the teeth in every subset."""
-    known: Levels = {}
-
-    def table(subset: str) -> FeatureTable:
-        return sound_record_table(source.part(subset), source.segments(subset), known)
-
-    return Parts.of(table)
+    return source.tables(TOOTH_INPUT.name, sound_record_table)
 
 
 TOOTH_INPUT = Input(name="tooth_changes", make=sound_record_tables)
@@ -150,7 +145,7 @@ def _measures(changes: FloatArray) -> FloatArray:
     return np.where(np.isfinite(columns), columns, np.nan)
 
 
-def _levels(task: Task, known: Levels, key: Key) -> dict[str, FloatArray]:
+def _levels(task: Task, known: Cache, key: Key) -> dict[str, FloatArray]:
     """Levels (channel, band, tooth) of either gear, tooth 0 first.
 
     NaN for a gear that makes no turn in the stretch.
@@ -169,7 +164,8 @@ def _levels(task: Task, known: Levels, key: Key) -> dict[str, FloatArray]:
             known[key][gear] = _of_gear(
                 signal, rate, frequency[gear], n_teeth[gear], first
             )
-    return known[key]
+    levels: dict[str, FloatArray] = known[key]
+    return levels
 
 
 def _of_gear(

@@ -1,4 +1,4 @@
-"""Simple models on the teeth of both gears that their sisters do not explain."""
+"""A simple model on the teeth of both gears that their sisters do not explain."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.baselines.base import (
-    Baseline,
     Input,
     MethodText,
     Parts,
@@ -18,7 +17,6 @@ from diagnose.baselines.base import (
 )
 from diagnose.baselines.estimators import (
     FittedModel,
-    boosted_trees,
     linear_model,
     logistic_regression,
 )
@@ -27,8 +25,9 @@ from diagnose.baselines.features import (
     Cache,
     FeatureTable,
     Key,
-    keys_of,
+    Rotation,
     known_rotation,
+    stretch_table,
 )
 from diagnose.baselines.tooth_features import GEAR_FEATURES, tooth_features
 from diagnose.data.teeth import missing_teeth
@@ -71,44 +70,35 @@ def why_no_turns(task: Task, protocol: str) -> str | None:
 def tooth_table(task: Task, segments: Segments, cache: Cache) -> FeatureTable:
     """`tooth_features` of both gears in every stretch; ``cache`` is filled and used."""
     rotation = known_rotation(task)
-    rate = float(task.dataset.sampling_rate)
 
-    def features(key: Key) -> FloatArray:
-        mesh_frequency = rotation.mesh_frequency(key[1])
-        driving, driven = rotation.n_teeth(key[1]).values()
-        signal = read_signal(task, *key[1:])
-        turns = turns_of(signal, rate, mesh_frequency, (driving, driven))
-        return tooth_features(*turns)
+    def values(key: Key) -> FloatArray:
+        return tooth_features(*turns_of(task, rotation, key))
 
-    keys = keys_of(task, segments)
-    for key in keys:
-        if key not in cache:
-            cache[key] = features(key)
-    return FeatureTable(
-        values=np.stack([cache[key] for key in keys]),
-        names=NAMES,
-        label=task.labels()[segments.record],
-        record=segments.record,
-    )
+    return stretch_table(task, segments, NAMES, values, cache)
 
 
 def turns_of(
-    signal: FloatArray,
-    sampling_rate: float,
-    mesh_frequency: float,
-    n_teeth: tuple[int, int],
+    task: Task, rotation: Rotation, key: Key, *, name: str = "acceleration"
 ) -> tuple[FloatArray, FloatArray]:
     """Deviations (channel, tooth, sample) of both gears from the mean passage, at constant speed.
+
+    Parameters
+    ----------
+    task, key : a stretch
+    rotation : of the records of the task
+    name : of the signal
 
     Raises
     ------
     ValueError    for less than a turn of the driving gear
     """
+    signal = read_signal(task, *key[1:], name=name)
+    driving, driven = rotation.n_teeth(key[1]).values()
     turns = separate_gears(
         signal,
-        sampling_rate,
-        mesh_frequency,
-        n_teeth,
+        float(task.dataset.sampling_rate),
+        rotation.mesh_frequency(key[1]),
+        (driving, driven),
         samples_per_tooth=SAMPLES_PER_TOOTH,
     )
     shape = (len(signal), -1, SAMPLES_PER_TOOTH)
@@ -117,12 +107,7 @@ def turns_of(
 
 def tooth_tables(source: Source) -> Parts:
     """Features of the teeth in every subset."""
-    cache = source.caches.setdefault(TEETH_INPUT.name, {})
-
-    def table(subset: str) -> FeatureTable:
-        return tooth_table(source.part(subset), source.segments(subset), cache)
-
-    return Parts.of(table, source.subsets)
+    return source.tables(TEETH_INPUT.name, tooth_table, source.subsets)
 
 
 TEETH_INPUT = Input(name="teeth", make=tooth_tables, why_not=why_no_turns)
@@ -165,27 +150,3 @@ class ToothLogistic(StorableBaseline):
             "kind": cls.text.name,
             "samples_per_tooth": SAMPLES_PER_TOOTH,
         }
-
-
-@final
-class ToothTrees(Baseline):
-    """Gradient boosting on `tooth_features`."""
-
-    text = MethodText(
-        name="tooth_trees",
-        label="teeth, boosted trees",
-        card_label=None,
-        meaning="gradient boosting on the same table of teeth.",
-    )
-    role = Role.RIVAL
-    reads = TEETH_INPUT
-    _model: FittedModel
-
-    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
-        """Fit to the training rows; there is no choice."""
-        self._model = boosted_trees(train, n_classes)
-        return f"gradient boosting on {len(self._model.columns)} columns"
-
-    def predict_proba(self, table: FeatureTable) -> FloatArray:
-        """Probabilities (row, class) of the boosted trees."""
-        return self._model.probability(table)

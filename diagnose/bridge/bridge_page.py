@@ -4,28 +4,21 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from diagnose.bridge.bridge_run import METHODS, BridgeResult
-from diagnose.bridge.bridge_scores import (
-    accuracy,
-    class_recalls,
-    confusion,
-    separation,
-    specimen_counts,
-)
+from diagnose.bridge.bridge_scores import class_recalls, confusion, specimen_counts
 from diagnose.bridge.bridge_words import (
     comparisons,
     headline,
     interval_text,
     ranked_rows,
 )
-from diagnose.report.markdown import table_lines
 from diagnose.studies.result_files import environment, write_rows
 from gensig.measured.measured_set import MeasuredSet
+from gensig.text.markdown import page_text
 from gensig.text.page import Section, Table, write_page
 
 PAGE, MARKDOWN, NUMBERS, ANSWERS = (
@@ -74,8 +67,8 @@ def write_bridge(
         sections=sections,
         program="diagnose bridge",
     )
-    text = "\n".join(markdown_lines(title, lead, sections))
-    (folder / MARKDOWN).write_text(f"{text}\n", encoding="utf-8")
+    text = page_text(title, lead, sections)
+    (folder / MARKDOWN).write_text(text, encoding="utf-8")
     numbers = json.dumps(content(found, data, result), indent=2, allow_nan=False)
     (folder / NUMBERS).write_text(f"{numbers}\n", encoding="utf-8")
     write_rows(folder / ANSWERS, _answer_rows(result))
@@ -188,37 +181,13 @@ def _confusion(result: BridgeResult, method: str) -> Table:
     return Table(head=("true", *result.judged.labels, "found"), rows=rows)
 
 
-def markdown_lines(
-    title: str, lead: Sequence[str], sections: Sequence[Section]
-) -> list[str]:
-    """The same page as Markdown."""
-    lines = [f"# {title}", ""]
-    for line in lead:
-        lines += [line, ""]
-    for section in sections:
-        lines += [f"## {section.title}", ""]
-        for line in section.text:
-            lines += [line, ""]
-        if section.table is not None:
-            lines += [*table_lines(section.table.head, section.table.rows), ""]
-        for term, meaning in section.notes:
-            start = f"**{term}**: " if term else ""
-            lines.append(f"- {start}{meaning}")
-        if section.notes:
-            lines.append("")
-    return lines[:-1]
-
-
 def content(found: MeasuredSet, data: Path, result: BridgeResult) -> dict[str, Any]:
     """The run as plain values."""
-    n_bootstrap = result.protocol.n_bootstrap
     methods = {}
     for method, answers in result.answers.items():
-        entry: dict[str, Any] = {
-            "healthy_against_faulty": separation(result.judged, answers.faulty)
-        }
-        if answers.predicted is not None:
-            score = accuracy(result.judged, answers.predicted, n_bootstrap=n_bootstrap)
+        entry: dict[str, Any] = {"healthy_against_faulty": result.separation(method)}
+        score = result.accuracy(method)
+        if score is not None and answers.predicted is not None:
             entry["balanced_accuracy"] = asdict(score)
             entry["confusion"] = confusion(result.judged, answers.predicted).tolist()
         methods[method] = entry

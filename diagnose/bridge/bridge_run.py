@@ -14,7 +14,13 @@ from diagnose.bridge.bridge_networks import (
     network_answers,
     with_shuffles,
 )
-from diagnose.bridge.bridge_scores import Answers, Judged
+from diagnose.bridge.bridge_scores import (
+    Answers,
+    Interval,
+    Judged,
+    accuracy,
+    separation,
+)
 from diagnose.bridge.healthy_distance import distance_answers
 from diagnose.bridge.implanted_windows import (
     BURSTS,
@@ -70,6 +76,17 @@ class BridgeResult:
     why_not: Mapping[str, str]
     n_blocks: tuple[int, int]
     window_seconds: float
+
+    def accuracy(self, method: str) -> Interval | None:
+        """Balanced accuracy of a method; None for one that names no class."""
+        predicted = self.answers[method].predicted
+        if predicted is None:
+            return None
+        return accuracy(self.judged, predicted, n_bootstrap=self.protocol.n_bootstrap)
+
+    def separation(self, method: str) -> float | None:
+        """Share of pairs of a healthy and a faulty recording that a method ranks right."""
+        return separation(self.judged, self.answers[method].faulty)
 
 
 def run_bridge(

@@ -179,8 +179,3 @@ def specimen_counts(judged: Judged) -> dict[str, int]:
         judged.labels[one]: int(np.unique(group[judged.label == one]).size)
         for one in np.unique(judged.label)
     }
-
-
-def says_nothing_of_others(judged: Judged) -> bool:
-    """True where some class present has a single specimen."""
-    return min(specimen_counts(judged).values()) == 1

@@ -9,12 +9,8 @@ import numpy as np
 from diagnose.bridge.bridge_run import NOVELTY, OURS, BridgeResult
 from diagnose.bridge.bridge_scores import (
     ONE_SPECIMEN,
-    IntArray,
     Interval,
-    accuracy,
     advantage,
-    says_nothing_of_others,
-    separation,
     specimen_counts,
 )
 
@@ -98,11 +94,8 @@ def headline(result: BridgeResult) -> list[str]:
     lines = [specimen_sentence(result)]
     verdicts = comparisons(result)
     lines.append(_summary(verdicts))
-    score = accuracy(
-        result.judged,
-        _predicted(result, OURS),
-        n_bootstrap=result.protocol.n_bootstrap,
-    )
+    score = result.accuracy(OURS)
+    assert score is not None  # a network names classes
     n_classes = len(specimen_counts(result.judged))
     lines.append(
         f"Implants: balanced accuracy {score.mean:.2f} over {n_classes} classes of recordings; "
@@ -116,7 +109,7 @@ def specimen_sentence(result: BridgeResult) -> str:
     """Number of specimens behind each class, and what follows."""
     counts = specimen_counts(result.judged)
     text = ", ".join(f"{label} {n}" for label, n in counts.items())
-    if says_nothing_of_others(result.judged):
+    if min(counts.values()) == 1:
         return f"Specimens: {text}. At least {ONE_SPECIMEN}."
     return f"Specimens: {text}."
 
@@ -137,8 +130,7 @@ def _detection_lines(result: BridgeResult) -> list[str]:
     if NOVELTY not in result.answers:
         reason = result.why_not.get(NOVELTY, "it was not run")
         return [f"Novelty gives no answer: {reason}."]
-    ours = separation(result.judged, result.answers[OURS].faulty)
-    novelty = separation(result.judged, result.answers[NOVELTY].faulty)
+    ours, novelty = result.separation(OURS), result.separation(NOVELTY)
     line = (
         "Healthy against faulty: the distance from healthy recordings separates "
         f"{area_text(novelty)} of pairs without any simulation, implants {area_text(ours)}."
@@ -180,31 +172,13 @@ def interval_text(interval: tuple[float, float] | None, *, sign: str = "") -> st
     return f"{low:{sign}.2f} to {high:{sign}.2f}"
 
 
-def _predicted(result: BridgeResult, method: str) -> IntArray:
-    predicted = result.answers[method].predicted
-    assert predicted is not None
-    return predicted
-
-
-def ranked_rows(result: BridgeResult) -> list[tuple[str, str, str, str, str]]:
+def ranked_rows(result: BridgeResult) -> list[tuple[str, ...]]:
     """A row a method: name, balanced accuracy, both intervals, healthy against faulty."""
     rows = []
-    for method, answers in result.answers.items():
-        area = area_text(separation(result.judged, answers.faulty))
-        if answers.predicted is None:
-            rows.append((method, "names no class", "", "", area))
-            continue
-        score = accuracy(
-            result.judged, answers.predicted, n_bootstrap=result.protocol.n_bootstrap
-        )
-        by_specimen = interval_text(score.by_specimen)
-        rows.append(
-            (
-                method,
-                f"{score.mean:.2f}",
-                interval_text(score.by_recording),
-                by_specimen,
-                area,
-            )
-        )
+    for method in result.answers:
+        score, cells = result.accuracy(method), ("names no class", "", "")
+        if score is not None:
+            ends = (score.by_recording, score.by_specimen)
+            cells = (f"{score.mean:.2f}", *map(interval_text, ends))
+        rows.append((method, *cells, area_text(result.separation(method))))
     return rows

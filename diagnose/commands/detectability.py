@@ -174,7 +174,6 @@ def _sample(
     """Tables over the size of the fault and the signal-to-noise ratio."""
     import gensig
     from diagnose.detectability.maps import read_bandwidths
-    from diagnose.detectability.pairs import Pairs
     from diagnose.detectability.sampling import make_sampling, read_axes
     from diagnose.detectability.sampling_text import sampling_content, sampling_lines
     from diagnose.progress import progress
@@ -193,7 +192,7 @@ def _sample(
             raise ConfigError(f"{key} is given twice; leave it out, or {flag}")
     operating = base.config["operating"]
 
-    def pairs_of(value: float, ratio: float, epoch: int) -> Pairs:
+    def pairs_of(value: float, ratio: float, epoch: int) -> gensig.FaultPairs:
         sampled = (f"{size}={value!r}", f"{RATIO}={ratio!r}")
         kept = [
             word for word in overrides if word.partition("=")[0] not in (size, RATIO)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from diagnose.data.loading.data_module import VibrationDataModule
     from diagnose.data.loading.replay import ReplayStream
+    from diagnose.data.loading.stored import VibrationDataset
+    from diagnose.data.loading.streamed import StreamingDataset
     from diagnose.data.loading.transforms import (
         AddNoise,
         ChooseChannels,
@@ -17,7 +19,6 @@ if TYPE_CHECKING:
         Resample,
         Shift,
     )
-    from diagnose.data.torch_sets import StreamingDataset, VibrationDataset
 
 __all__ = [
     "AddNoise",
@@ -36,9 +37,9 @@ __all__ = [
 # Modules of the names that are not transforms.
 _MODULES = {
     "ReplayStream": "diagnose.data.loading.replay",
-    "StreamingDataset": "diagnose.data.torch_sets",
+    "StreamingDataset": "diagnose.data.loading.streamed",
     "VibrationDataModule": "diagnose.data.loading.data_module",
-    "VibrationDataset": "diagnose.data.torch_sets",
+    "VibrationDataset": "diagnose.data.loading.stored",
 }
 
 

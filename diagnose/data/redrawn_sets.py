@@ -9,13 +9,12 @@ from typing import final
 import numpy as np
 
 from diagnose.data.redraws import RedrawnMachine, Redraws, difference
-from diagnose.data.teeth import teeth_of_records
+from diagnose.data.teeth import START, teeth_of_records
 from diagnose.data.windows import Task
 from gensig.errors import ConfigError, DatasetError
 from gensig.signals.separation import FloatArray, GearTurns, separate_gears
 
 SOURCE, TWIN = "acceleration_source", "healthy_twin_source"
-START = ("start_phase", "start_tooth_pinion", "start_tooth_wheel")
 NEEDED = (
     "re-draws need every record at the bearings with its healthy twin: make the data set with "
     "dataset.store_source=true dataset.store_healthy_twin=true, or give model.redraws=0"

@@ -14,6 +14,7 @@ from torch.nn.functional import (
     log_softmax,
 )
 
+from diagnose.data.teeth import START
 from diagnose.data.windows import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -25,14 +26,7 @@ GEARS = ("none", "pinion", "wheel")
 # Base pitches before and after a tooth comes into mesh, in which its fault may show; assumed.
 BEFORE, AFTER = 0.3, 2.2
 NEVER = -30.0  # log-probability of positions that are not the fault's
-START = "start_phase"  # share of a passage that the first tooth has already moved
-TOOTH_COLUMNS = (
-    "fault_gear",
-    "fault_tooth",
-    START,
-    "start_tooth_pinion",
-    "start_tooth_wheel",
-)
+TOOTH_COLUMNS = ("fault_gear", "fault_tooth", *START)
 
 
 def record_targets(dataset: Dataset, record: IntArray) -> dict[str, NDArray[Any]]:
@@ -103,9 +97,9 @@ def tooth_entries(
     (window,) share of a passage from the first sample of the window to the next entry; NaN if
     the data set does not say the start
     """
-    if START not in dataset.column_names:
+    if START[0] not in dataset.column_names:
         return np.full(len(record), np.nan, dtype=np.float32)
-    phase = np.asarray(dataset.column(START), dtype=float)[record]
+    phase = np.asarray(dataset.column(START[0]), dtype=float)[record]
     return np.mod(-phase - passages, 1.0).astype(np.float32)
 
 

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
 GEARS = ("pinion", "wheel")  # the driving and the driven one
+# Columns: share of a passage that has passed at the first sample, and the tooth of each gear then.
+START = ("start_phase", "start_tooth_pinion", "start_tooth_wheel")
 
 
 def missing_teeth(dataset: Dataset) -> str | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.detectability.maps import Maps, best_and_worst
-from diagnose.detectability.summary import short
+from diagnose.detectability.summary import short, two_digits
+from gensig.text.parameters import size_words
 
 FloatArray = NDArray[np.floating]
 
@@ -46,15 +48,10 @@ class _Row:
 
 def detectability_figure(path: Path, maps: Maps) -> None:
     """Write the figure; its type is that of the name."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     small = max(4.6, 1.25 * len(maps.bandwidths))
     large = 1.2 * len(maps.torques_nm) + 3.0
     height = 2.0 * max(4.0, 1.15 * len(maps.channels))
-    figure = Figure(figsize=(large + small, height), dpi=130)
-    figure.set_layout_engine("constrained", hspace=0.03)
-    FigureCanvasAgg(figure)
+    figure = new_figure(large + small, height, hspace=0.03)
     parts: Any = figure.subfigures(2, 2, width_ratios=(large, small))
     for (left, right), row in zip(parts, (_known(maps), _seen(maps)), strict=True):
         image = _best_map(left, maps, row)
@@ -63,6 +60,22 @@ def detectability_figure(path: Path, maps: Maps) -> None:
     records = f"{maps.n_units} machines, records of {maps.duration:g} s"
     title = f"Which test shows the fault? {fault_text(maps.fault)}; {records}"
     figure.suptitle(title, fontsize=13)
+    save(figure, path)
+
+
+def new_figure(width: float, height: float, **spaces: float) -> Any:
+    """An empty figure, inches, without the state of pyplot: no display is needed."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=130)
+    figure.set_layout_engine("constrained", **spaces)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save(figure: Any, path: Path) -> None:
+    """Write a figure, a PNG with the same bytes on every run."""
     metadata = None
     if path.suffix == ".png":
         metadata = {"Software": None}
@@ -80,8 +93,8 @@ def _part_text(part: dict[str, Any]) -> str:
     sizes = []
     for key, value in part.items():
         if isinstance(value, int | float) and key != "tooth":
-            *words, unit = key.split("_")
-            sizes.append(f"{' '.join(words)} {value:g} {unit}")
+            words, unit = size_words(key)
+            sizes.append(f"{words} {value:g} {unit}")
     if sizes:
         text += f" ({', '.join(sizes[:3])})"
     return text
@@ -121,32 +134,16 @@ def _best_map(figure: Any, maps: Maps, row: _Row) -> Any:
     *best, channel, band = row.best
     values = row.values[:, :, channel, band]
     axes = figure.subplots()
-    image = _image(axes, values, row)
-    for cell, value in np.ndenumerate(values):
-        if not np.isfinite(value):
-            continue
-        text = short(float(value))
-        if row.auroc is not None:
-            # adding 0 turns -0.00 into 0.00
-            rounded = round(float(value), 2) + 0.0
-            text = f"{rounded:.2f}\n({row.auroc[(*cell, channel, band)]:.2f})"
-        color, weight = "black", "normal"
-        if row.norm(value) < DARK:
-            color = "white"
-        if list(cell) == best:
-            weight = "bold"
-        axes.text(
-            cell[1],
-            cell[0],
-            text,
-            ha="center",
-            va="center",
-            color=color,
-            fontsize=9.5,
-            fontweight=weight,
-        )
-    for axis, numbers in ((axes.xaxis, maps.torques_nm), (axes.yaxis, maps.speeds_rpm)):
-        axis.set_ticks(range(len(numbers)), [f"{number:g}" for number in numbers])
+    image = shades(axes, values, row.norm)
+
+    def text(cell: tuple[int, ...]) -> str:
+        if row.auroc is None:
+            return short(float(values[cell]))
+        auroc = row.auroc[(*cell, channel, band)]
+        return f"{two_digits(float(values[cell]))}\n({auroc:.2f})"
+
+    write_cells(axes, values, row.norm, text, bold=tuple(best), fontsize=9.5)
+    set_numbers(axes, maps.torques_nm, maps.speeds_rpm)
     axes.set(xlabel="torque of the pinion, N m", ylabel="speed of the pinion, r/min")
     inside = "d'"
     if row.auroc is not None:
@@ -161,7 +158,7 @@ def _all_maps(figure: Any, maps: Maps, row: _Row) -> Any:
     """The same map for every channel (down) and bandwidth (across), on the same scale of colors."""
     axes = figure.subplots(len(maps.channels), len(maps.bandwidths), squeeze=False)
     for (channel, band), panel in np.ndenumerate(axes):
-        _image(panel, row.values[:, :, channel, band], row)
+        shades(panel, row.values[:, :, channel, band], row.norm)
         panel.set_xticks([])
         panel.set_yticks([])
         if channel == 0:
@@ -176,12 +173,41 @@ def _all_maps(figure: Any, maps: Maps, row: _Row) -> Any:
     return axes
 
 
-def _image(axes: Any, values: FloatArray, row: _Row) -> Any:
+def shades(axes: Any, values: FloatArray, norm: Any) -> Any:
+    """Values, (up, across), as colors; what is no number is grey."""
     axes.set_facecolor("0.85")
     return axes.imshow(
         np.ma.masked_invalid(values),
         cmap=COLORS,
-        norm=row.norm,
+        norm=norm,
         origin="lower",
         aspect="auto",
     )
+
+
+def write_cells(
+    axes: Any,
+    values: FloatArray,
+    norm: Any,
+    text: Callable[[tuple[int, ...]], str],
+    *,
+    bold: tuple[int, ...] = (),
+    **font: float,
+) -> None:
+    """Write the text of each cell that has a number; one of them may be bold."""
+    for cell, value in np.ndenumerate(values):
+        if not np.isfinite(value):
+            continue
+        color, weight = "black", "normal"
+        if norm(value) < DARK:
+            color = "white"
+        if cell == bold:
+            weight = "bold"
+        place = {"ha": "center", "va": "center", "fontweight": weight}
+        axes.text(cell[1], cell[0], text(cell), color=color, **place, **font)
+
+
+def set_numbers(axes: Any, across: Sequence[float], up: Sequence[float]) -> None:
+    """Numbers of the columns and rows of cells."""
+    for axis, numbers in ((axes.xaxis, across), (axes.yaxis, up)):
+        axis.set_ticks(range(len(numbers)), [f"{number:g}" for number in numbers])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,11 @@ from diagnose.detectability.observers import (
     residual_energy,
     seen_by_indicators,
 )
-from diagnose.detectability.pairs import PairCell, Pairs
 from diagnose.workers import call_all
 from gensig.errors import ConfigError, GensigError
+
+if TYPE_CHECKING:
+    from gensig import FaultPairs, PairCell
 
 FloatArray = NDArray[np.floating]
 
@@ -75,7 +77,9 @@ class Maps:
     n_failed: int
 
 
-def read_bandwidths(given: Sequence[float] | None, pairs: Pairs) -> tuple[float, ...]:
+def read_bandwidths(
+    given: Sequence[float] | None, pairs: FaultPairs
+) -> tuple[float, ...]:
     """Upper frequencies in Hz, rising.
 
     By default those of `BANDWIDTHS_HZ` that the signals have, and their highest.
@@ -98,7 +102,7 @@ def read_bandwidths(given: Sequence[float] | None, pairs: Pairs) -> tuple[float,
 
 
 def make_maps(
-    pairs: Pairs,
+    pairs: FaultPairs,
     bandwidths: Sequence[float],
     *,
     n_workers: int,
@@ -146,12 +150,12 @@ def make_maps(
     )
 
 
-def _cell_text(pairs: Pairs, index: int) -> str:
+def _cell_text(pairs: FaultPairs, index: int) -> str:
     speed, torque = divmod(index, len(pairs.torques_nm))
     return f"{pairs.speeds_rpm[speed]:g} r/min, {pairs.torques_nm[torque]:g} N m"
 
 
-def look_at(pairs: Pairs, bandwidths: Sequence[float], index: int) -> Cell:
+def look_at(pairs: FaultPairs, bandwidths: Sequence[float], index: int) -> Cell:
     """Simulate one cell and let both observers look at it."""
     cell = pairs.cell(index)
     sound, faulty = _indicator_tables(pairs, cell, bandwidths)
@@ -191,7 +195,7 @@ def best_and_worst(values: FloatArray) -> tuple[tuple[int, ...], tuple[int, ...]
     return largest, smallest
 
 
-def confirm_best(maps: Maps, others: Pairs) -> Seen:
+def confirm_best(maps: Maps, others: FaultPairs) -> Seen:
     """The best test of the indicators on machines that had no part in choosing it.
 
     Parameters
@@ -211,7 +215,7 @@ def confirm_best(maps: Maps, others: Pairs) -> Seen:
 
 
 def _indicator_tables(
-    pairs: Pairs, cell: PairCell, bandwidths: Sequence[float]
+    pairs: FaultPairs, cell: PairCell, bandwidths: Sequence[float]
 ) -> tuple[FloatArray, FloatArray]:
     """Indicators of healthy and of faulty records, (unit, channel, band, indicator) each."""
     n_indicators = len(indicator_names(list(pairs.gears)))

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.detectability.maps import best_and_worst, confirm_best, make_maps
-from diagnose.detectability.pairs import Pairs
 from diagnose.workers import call_all
 from gensig.errors import ConfigError
 
+if TYPE_CHECKING:
+    from gensig import FaultPairs
+
 FloatArray = NDArray[np.floating]
-MakePairs = Callable[[float, float, int], Pairs]
+MakePairs = Callable[[float, float, int], "FaultPairs"]
 
 SIZE_SHARES = (0.25, 0.5, 1.0, 1.5, 2.0)  # of the configured size
 SNRS_DB = (0.0, 10.0, 20.0, 30.0)
@@ -98,7 +100,7 @@ def read_axis(
 
 
 def read_axes(
-    base: Pairs, sizes: Sequence[float] | None, snrs_db: Sequence[float] | None
+    base: FaultPairs, sizes: Sequence[float] | None, snrs_db: Sequence[float] | None
 ) -> Axes:
     """Sizes and ratios to sample, by default about the configured fault.
 
@@ -173,7 +175,9 @@ def make_sampling(
 
 
 def sample_at(
-    pairs: Sequence[tuple[Pairs, Pairs]], bandwidths: Sequence[float], index: int
+    pairs: Sequence[tuple[FaultPairs, FaultPairs]],
+    bandwidths: Sequence[float],
+    index: int,
 ) -> Sample:
     """Simulate one size and ratio, and let both observers look at it."""
     chosen, others = pairs[index]

@@ -6,11 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LogNorm, Normalize
-from matplotlib.figure import Figure
 
-from diagnose.detectability.figure import COLORS, DARK, fault_text
+from diagnose.detectability.figure import (
+    fault_text,
+    new_figure,
+    save,
+    set_numbers,
+    shades,
+    write_cells,
+)
 from diagnose.detectability.sampling import (
     FOUND_KNOWN,
     FOUND_SEEN,
@@ -19,6 +24,7 @@ from diagnose.detectability.sampling import (
     found_from,
 )
 from diagnose.detectability.summary import short
+from gensig.text.parameters import size_words
 
 EDGE = "#D55E00"  # of the least size that is found
 LEAST_KNOWN = 0.1  # d' at the lower end of the scale of the filter
@@ -27,9 +33,7 @@ LEAST_KNOWN = 0.1  # d' at the lower end of the scale of the filter
 def sampling_figure(path: Path, sampling: Sampling) -> None:
     """Write the figure; its type is that of the name."""
     width = 2 * (1.1 * len(sampling.axes.snrs_db) + 2.6)
-    figure = Figure(figsize=(width, 0.55 * len(sampling.axes.sizes) + 2.4), dpi=130)
-    figure.set_layout_engine("constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(width, 0.55 * len(sampling.axes.sizes) + 2.4)
     seen, known = sampling.values("on_others"), sampling.values("known")
     top = float(np.nanmax([1.5 * FOUND_SEEN, *seen.flat]))
     largest = float(np.nanmax([10.0 * FOUND_KNOWN, *known.flat]))
@@ -58,8 +62,7 @@ def sampling_figure(path: Path, sampling: Sampling) -> None:
         f"Which size is found at which noise? {fault_text(fixed)}; {place}; {records}",
         fontsize=11,
     )
-    metadata = {"Software": None} if path.suffix == ".png" else None
-    figure.savefig(path, metadata=metadata)
+    save(figure, path)
 
 
 def _panel(
@@ -72,32 +75,19 @@ def _panel(
     title: str,
 ) -> None:
     """One observer: d' in the cells, a line below the least size that is found at each ratio."""
-    axes.set_facecolor("0.85")
-    axes.imshow(
-        np.ma.masked_invalid(np.maximum(values, norm.vmin or 0.0)),
-        cmap=COLORS,
-        norm=norm,
-        origin="lower",
-        aspect="auto",
-    )
-    for (row, column), value in np.ndenumerate(values):
-        if np.isfinite(value):
-            shade = float(norm(max(float(value), norm.vmin or 0.0)))
-            color = "white" if shade < DARK else "black"
-            text = short(float(value)) if value >= 10.0 else f"{value + 0.0:.2f}"
-            axes.text(column, row, text, ha="center", va="center", color=color)
+
+    def text(cell: tuple[int, ...]) -> str:
+        value = float(values[cell])
+        return short(value) if value >= 10.0 else f"{value + 0.0:.2f}"
+
+    shown = np.maximum(values, norm.vmin or 0.0)
+    shades(axes, shown, norm)
+    write_cells(axes, shown, norm, text)
     for column, row in enumerate(found_from(values, least)):
         if row is not None:
             ends = [column - 0.5, column + 0.5]
             axes.plot(ends, [row - 0.5] * 2, color=EDGE, linewidth=4, clip_on=False)
-    axes.set_xticks(
-        range(len(sampling.axes.snrs_db)),
-        [f"{ratio:g}" for ratio in sampling.axes.snrs_db],
-    )
-    axes.set_yticks(
-        range(len(sampling.axes.sizes)), [f"{size:g}" for size in sampling.axes.sizes]
-    )
-    *words, unit = sampling.axes.size_key.split("_")
+    set_numbers(axes, sampling.axes.snrs_db, sampling.axes.sizes)
     axes.set_xlabel("signal-to-noise ratio, dB")
-    axes.set_ylabel(f"{' '.join(words)}, {unit}")
+    axes.set_ylabel(", ".join(size_words(sampling.axes.size_key)))
     axes.set_title(f"{title}\nd'; above the bar {least:g} or more", fontsize=10)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from diagnose.detectability.sampling import (
@@ -12,7 +11,8 @@ from diagnose.detectability.sampling import (
     Sampling,
     found_from,
 )
-from diagnose.detectability.summary import short
+from diagnose.detectability.summary import short, two_digits
+from gensig.text.amounts import finite
 
 WIDTH = 16  # of a column
 
@@ -88,11 +88,11 @@ def _row(sample: Sample, *, size: float, snr_db: float) -> dict[str, Any]:
     return {
         "size": size,
         "snr_db": snr_db,
-        "d_prime_known": _finite(sample.known),
-        "d_prime_seen": _finite(sample.seen),
-        "d_prime_on_others": _finite(sample.on_others),
-        "standard_error_on_others": _finite(sample.standard_error),
-        "auroc_on_others": _finite(sample.auroc),
+        "d_prime_known": finite(sample.known),
+        "d_prime_seen": finite(sample.seen),
+        "d_prime_on_others": finite(sample.on_others),
+        "standard_error_on_others": finite(sample.standard_error),
+        "auroc_on_others": finite(sample.auroc),
         "channel": channel,
         "bandwidth_hz": bandwidth,
         "indicator": indicator,
@@ -101,8 +101,7 @@ def _row(sample: Sample, *, size: float, snr_db: float) -> dict[str, Any]:
 
 
 def _seen_text(sample: Sample) -> str:
-    rounded = round(sample.on_others, 2) + 0.0  # turns -0.00 into 0.00
-    return f"{rounded:.2f} ({sample.auroc:.2f})"
+    return f"{two_digits(sample.on_others)} ({sample.auroc:.2f})"
 
 
 def _table(sampling: Sampling, text: Any) -> list[str]:
@@ -131,8 +130,3 @@ def _from_text(sampling: Sampling, number: int | None) -> str:
 
 def _size(sampling: Sampling, number: int | None) -> float | None:
     return None if number is None else sampling.axes.sizes[number]
-
-
-def _finite(value: float) -> float | None:
-    """A number for JSON; None for NaN."""
-    return value if math.isfinite(value) else None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from diagnose.detectability.maps import Maps, best_and_worst
 from diagnose.detectability.observers import Seen
+from gensig.text.amounts import finite
 
 
 def summary(maps: Maps, confirmation: Seen) -> list[str]:
@@ -44,6 +44,11 @@ def short(value: float) -> str:
     return f"{value:.3g}"
 
 
+def two_digits(value: float) -> str:
+    """Two digits behind the point, never -0.00."""
+    return f"{round(value, 2) + 0.0:.2f}"
+
+
 def place_text(maps: Maps, place: Sequence[int]) -> str:
     """A test in words."""
     speed, torque, channel, band = place
@@ -69,9 +74,9 @@ def content(maps: Maps, confirmation: Seen) -> dict[str, Any]:
         "best_seen": {
             **_test(maps, best),
             "fault_raises_it": bool(maps.raises[best]),
-            "d_prime_on_others": _finite(confirmation.d_prime),
-            "standard_error_on_others": _finite(confirmation.standard_error),
-            "auroc_on_others": _finite(confirmation.auroc),
+            "d_prime_on_others": finite(confirmation.d_prime),
+            "standard_error_on_others": finite(confirmation.standard_error),
+            "auroc_on_others": finite(confirmation.auroc),
         },
         "tests": [_test(maps, place) for place in np.ndindex(maps.known.shape)],
     }
@@ -86,18 +91,11 @@ def _test(maps: Maps, place: tuple[int, ...]) -> dict[str, Any]:
         "channel": maps.channels[channel],
         "bandwidth_hz": maps.bandwidths[band],
         "band_low_hz": (0.0, *maps.bandwidths)[band],
-        "d_prime_known": _finite(maps.known[place]),
-        "d_prime_known_band": _finite(maps.known_band[place]),
-        "d_prime_seen": _finite(maps.seen[place]),
-        "standard_error_seen": _finite(maps.standard_error[place]),
-        "auroc_seen": _finite(maps.auroc[place]),
+        "d_prime_known": finite(maps.known[place]),
+        "d_prime_known_band": finite(maps.known_band[place]),
+        "d_prime_seen": finite(maps.seen[place]),
+        "standard_error_seen": finite(maps.standard_error[place]),
+        "auroc_seen": finite(maps.auroc[place]),
         "indicator": indicators.get(int(maps.indicator[place])),
-        "noise_rms_m_per_s2": _finite(maps.noise_rms[place[:3]]),
+        "noise_rms_m_per_s2": finite(maps.noise_rms[place[:3]]),
     }
-
-
-def _finite(value: Any) -> float | None:
-    """A number for JSON; None for NaN."""
-    if math.isfinite(value):
-        return float(value)
-    return None

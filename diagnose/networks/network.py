@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import torch
@@ -209,32 +209,3 @@ def check_blocks(*options: Sequence[int]) -> None:
             "model: widths, kernels and strides must be lists of the same length, "
             "one entry a block"
         )
-
-
-def convolution_blocks(
-    n_channels: int,
-    widths: Sequence[int],
-    kernels: Sequence[int],
-    strides: Sequence[int],
-    start: Callable[[torch.Tensor], None] = lambda weight: None,
-) -> nn.Sequential:
-    """Convolutions padded by half their kernels, each with batch normalisation and ReLU.
-
-    Parameters
-    ----------
-    n_channels : of the input
-    widths, kernels, strides : channels after each block, its kernel in its input's samples, its
-        stride
-    start : fills the weights of the first convolution, before those of the others are drawn
-    """
-    check_blocks(widths, kernels, strides)
-    layers: list[nn.Module] = []
-    for n_out, kernel, stride in zip(widths, kernels, strides, strict=True):
-        convolution = nn.Conv1d(
-            n_channels, n_out, kernel, stride, padding=kernel // 2, bias=False
-        )
-        if not layers:
-            start(convolution.weight)
-        layers += [convolution, nn.BatchNorm1d(n_out), nn.ReLU()]
-        n_channels = n_out
-    return nn.Sequential(*layers)

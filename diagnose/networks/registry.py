@@ -14,9 +14,7 @@ from diagnose.data.inputs import NetworkInput
 from diagnose.networks.network import Network
 from diagnose.networks.order_cnn import OrderCnn
 from diagnose.networks.small_cnn import SmallCnn
-from diagnose.networks.spectrum import SpectrumCnn
 from diagnose.networks.tooth_network import ToothNetwork
-from diagnose.networks.wdcnn import Wdcnn
 from gensig.errors import ConfigError
 from gensig.options.configuration import Section
 
@@ -26,8 +24,6 @@ if TYPE_CHECKING:
 # Kind in a configuration -> network; each declares what it reads as its ``inputs``.
 MODELS: dict[str, type[Network]] = {
     "small_cnn": SmallCnn,
-    "wdcnn": Wdcnn,
-    "spectrum_cnn": SpectrumCnn,
     "order_cnn": OrderCnn,
     "tooth_network": ToothNetwork,
 }

@@ -11,7 +11,7 @@ from torch import nn
 
 from diagnose.data.inputs import NetworkInput
 from diagnose.data.window_input import Windows
-from diagnose.networks.network import FeatureNetwork, convolution_blocks
+from diagnose.networks.network import FeatureNetwork, check_blocks
 
 
 class SmallCnn(FeatureNetwork):
@@ -50,9 +50,17 @@ class SmallCnn(FeatureNetwork):
         heads: Sequence[str] = (),
     ) -> None:
         super().__init__(input_scale)
-        self.blocks = convolution_blocks(
-            n_channels, widths, kernels, strides, _start_as_band_passes
-        )
+        check_blocks(widths, kernels, strides)
+        layers: list[nn.Module] = []
+        for n_out, kernel, stride in zip(widths, kernels, strides, strict=True):
+            convolution = nn.Conv1d(
+                n_channels, n_out, kernel, stride, padding=kernel // 2, bias=False
+            )
+            if not layers:
+                _start_as_band_passes(convolution.weight)
+            layers += [convolution, nn.BatchNorm1d(n_out), nn.ReLU()]
+            n_channels = n_out
+        self.blocks = nn.Sequential(*layers)
         n_features = 2 * widths[-1]
         self.head = nn.Sequential(nn.Dropout(dropout), nn.Linear(n_features, n_classes))
         self.add_heads(heads, n_features, n_classes)

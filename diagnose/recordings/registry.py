@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 from diagnose.data.lives import lives_of
 from diagnose.data.windows import Task
@@ -20,6 +19,7 @@ from diagnose.recordings.stored_network import StoredNetwork
 from diagnose.report.base import Report
 from diagnose.report.life_report import LifeReport
 from diagnose.report.page import ClassReport
+from diagnose.scoring.predictions import Prediction
 from diagnose.studies.class_study import ClassStudy
 from diagnose.studies.jobs import LearningStudy
 from diagnose.studies.life_study import LifeStudy
@@ -38,8 +38,8 @@ class Target:
     stored : kind of its networks, as they are stored
     """
 
-    study: type[LearningStudy[Any]]
-    report: Callable[[Path, Task, Content, Sequence[Any]], Report]
+    study: type[LearningStudy]
+    report: Callable[[Path, Task, Content, Sequence[Prediction]], Report]
     stored: type[StoredNetwork]
 
 

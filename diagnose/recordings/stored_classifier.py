@@ -30,11 +30,10 @@ from diagnose.recordings.tooth_classifier import (
 )
 from diagnose.recordings.verdict import class_text, score_text, verdict
 from diagnose.report.figures import confusion_figure
-from diagnose.scoring.judged import spread_text
-from diagnose.scoring.machines import machines_of
+from diagnose.scoring.intervals import spread_text
+from diagnose.scoring.judged import class_scores, judged_answers
 from diagnose.scoring.metrics import over_records
-from diagnose.studies.counts import n_different, unit_ids
-from diagnose.studies.protocol_results import score_predictions
+from diagnose.studies.counts import n_different
 from diagnose.studies.result_files import Content
 from diagnose.training.classes import predict_windows
 from diagnose.training.heads import fault_site, predict_heads
@@ -172,17 +171,18 @@ class StoredClassifier(StoredNetwork):
         calibration = calibration_scores(
             [log_probability], [task.labels()[record]], [description.temperature]
         )
-        predicted = [(record, log_probability.argmax(axis=1))]
+        name, n_bootstrap = str(description.model.get("name")), description.n_bootstrap
+        judged = judged_answers(task, name, record, log_probability[None])
         return Scores(
             counts={
                 "n_records": int(record.size),
-                "n_units": n_different(unit_ids(task)[record]),
+                "n_units": n_different(judged.unit),
             },
             method={},
             values={
-                "resampled": machines_of(task.dataset, record).counts(),
+                "resampled": judged.machines.counts(),
                 "calibration": calibration,
-                **score_predictions(task, predicted, description.n_bootstrap),
+                **class_scores(judged, task.class_names, n_bootstrap),
             },
             write=_write_confusion,
         )

@@ -24,19 +24,18 @@ from diagnose.recordings.stored_network import (
     require_finite,
 )
 from diagnose.report.life_report import life_figure
-from diagnose.scoring.judged import spread_text
-from diagnose.scoring.life_scores import MEASURES, interval, life_scores
-from diagnose.studies.life_jobs import LifePrediction
+from diagnose.scoring.hours import AGE, LifeFacts, interval
+from diagnose.scoring.intervals import spread_text
+from diagnose.scoring.judged import BOOTSTRAP_SEED
+from diagnose.scoring.life_scores import MEASURES, by_life, life_scores
+from diagnose.scoring.predictions import Prediction
 from diagnose.studies.life_study import (
     below_bound,
     count_lives,
-    machines_of_lives,
-    measured,
+    judged_lives,
     write_life_predictions,
 )
-from diagnose.studies.protocol_results import BOOTSTRAP_SEED
 from diagnose.studies.result_files import Content
-from diagnose.training.life_facts import AGE, LifeFacts
 from diagnose.training.remaining_life import (
     LifeNetwork,
     load_life_model,
@@ -170,17 +169,16 @@ class StoredLife(StoredNetwork):
         told = np.stack(columns, axis=1)
         record, share = shares_of_records(self.model, windows, told)
         require_finite(remaining_life=share)
-        prediction = LifePrediction(
+        prediction = Prediction(
             protocol=description.protocol,
             method=facts.method,
             seed=description.seed,
             record=record,
-            predicted=facts.early_life_h * share,
-            half_width=facts.half_width_h,
-            early_life=facts.early_life_h,
+            answers=facts.early_life_h * share[:, None],
             detail=part,
+            hours=facts,
         )
-        machines = machines_of_lives(task, lives, record)
+        judged = judged_lives(task, lives, [prediction])
 
         def write(folder: Path, result: dict[str, Any]) -> None:
             path = folder / "predictions.csv"
@@ -200,10 +198,10 @@ class StoredLife(StoredNetwork):
                 "coverage_wanted": facts.coverage,
                 "intervals_hold": facts.intervals_hold,
                 "censored_below_bound": below_bound(lives, prediction),
-                "resampled": machines.counts(),
+                "resampled": judged.machines.counts(),
                 **life_scores(
-                    measured(lives, [prediction]),
-                    machines=machines,
+                    by_life(judged, [facts]),
+                    machines=judged.machines,
                     n_bootstrap=description.n_bootstrap,
                     rng=np.random.default_rng(BOOTSTRAP_SEED),
                 ),

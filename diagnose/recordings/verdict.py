@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from diagnose.scoring.judged import interval_text
-from diagnose.scoring.metrics import is_above
+from diagnose.scoring.intervals import interval_text, is_above
 from diagnose.studies.result_files import Content
 
 LEAST_MARGIN = 0.10  # between the two most probable classes; assumed

@@ -10,7 +10,7 @@ from diagnose.report.answer_figures import (
     graded_classes,
     window_length_figure,
 )
-from diagnose.scoring.judged import interval_text
+from diagnose.scoring.intervals import interval_text
 from diagnose.studies.result_files import Content
 from gensig.text.page import Section, Table
 

@@ -10,8 +10,7 @@ from diagnose.report.methods import (
     oracle_labels,
 )
 from diagnose.report.text import score_cell
-from diagnose.scoring.judged import interval_text, too_few_text
-from diagnose.scoring.metrics import is_above
+from diagnose.scoring.intervals import interval_text, is_above, too_few_text
 from diagnose.studies.result_files import Content
 from gensig.text.page import Section, Table
 

@@ -7,10 +7,9 @@ from typing import Any
 
 from diagnose.data.protocols import MEANING
 from diagnose.report.headlines import headline_protocol, headlines
-from diagnose.scoring.alarm_threshold import FALSE_ALARMS
+from diagnose.scoring.alarms import FALSE_ALARMS
 from diagnose.scoring.detection_limit import too_few_for_curve
-from diagnose.scoring.judged import interval_text, too_few_text
-from diagnose.scoring.metrics import is_above
+from diagnose.scoring.intervals import interval_text, is_above, too_few_text
 from diagnose.studies.result_files import Content
 from diagnose.studies.verdicts import failed_controls
 from gensig.text.page import Section, Table

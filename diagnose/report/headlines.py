@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from diagnose.data.protocols import NEW_MACHINE
 from diagnose.report.methods import CHANCE, REFERENCE_TEXT
-from diagnose.scoring.judged import interval_text
+from diagnose.scoring.intervals import interval_text
 from diagnose.studies.protocol_results import main_protocol
 from diagnose.studies.result_files import Content
 from diagnose.studies.verdicts import failed_controls

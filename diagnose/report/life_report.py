@@ -12,7 +12,6 @@ import numpy as np
 from diagnose.data.lives import Lives
 from diagnose.data.protocols import MEANING
 from diagnose.report.base import Report
-from diagnose.report.markdown import table_lines
 from diagnose.report.panels import COLORS, panels, save, spaced
 from diagnose.report.text import (
     FEW_UNITS,
@@ -25,10 +24,12 @@ from diagnose.report.text import (
     level_text,
     made_by,
 )
-from diagnose.scoring.judged import drawn_text, interval_text, too_few_text
+from diagnose.scoring.intervals import drawn_text, interval_text, too_few_text
 from diagnose.scoring.life_scores import BAND, MEASURES
-from diagnose.studies.life_jobs import AGE_ONLY, AND_AGE, CONSTANT, LifePrediction
+from diagnose.scoring.predictions import Prediction, hours_of
+from diagnose.studies.life_jobs import AGE_ONLY, AND_AGE, CONSTANT
 from diagnose.studies.result_files import Content, write_rows
+from gensig.text.markdown import table_lines
 from gensig.text.page import Card, Section, Table
 
 MOST_LINES = 12  # lives in one panel; more cannot be told apart
@@ -91,7 +92,7 @@ class LifeReport(Report):
     title: ClassVar[str] = "How long the machines still run"
     metrics: Content
     lives: Lives
-    predictions: Sequence[LifePrediction]
+    predictions: Sequence[Prediction]
 
     def lines(self) -> list[str]:
         """Tables of all protocols as Markdown."""
@@ -159,11 +160,9 @@ def life_table(result: Content) -> Table:
     return Table(head=["method", *HEAD.values()], rows=rows)
 
 
-def life_figure(
-    path: Path, lives: Lives, predictions: Sequence[LifePrediction]
-) -> None:
+def life_figure(path: Path, lives: Lives, predictions: Sequence[Prediction]) -> None:
     """Predicted against true remaining life, one panel a method: an alpha-lambda plot."""
-    shown: dict[str, LifePrediction] = {}
+    shown: dict[str, Prediction] = {}
     for run in predictions:
         if run.method != CONSTANT:
             shown.setdefault(run.method, run)
@@ -176,9 +175,9 @@ def life_figure(
     save(figure, path)
 
 
-def _life_panel(panel: Any, lives: Lives, run: LifePrediction) -> None:
+def _life_panel(panel: Any, lives: Lives, run: Prediction) -> None:
     """Draw the cone about the truth, and a line for each life that failed."""
-    level, life = run.early_life, lives.name[run.record]
+    level, life = hours_of(run).early_life_h, lives.name[run.record]
     at = np.linspace(0, level, 50)
     wide = np.minimum((1 + ALPHA) * at, level)
     panel.fill_between(at, (1 - ALPHA) * at, wide, color="0.88")
@@ -190,7 +189,7 @@ def _life_panel(panel: Any, lives: Lives, run: LifePrediction) -> None:
         mine = mine[np.argsort(lives.age[run.record[mine]])]
         panel.plot(
             np.minimum(lives.remaining[run.record[mine]], level),
-            run.predicted[mine],
+            run.answers[mine, 0],
             color=COLORS[index % len(COLORS)],
             marker=".",
             linewidth=0.8,

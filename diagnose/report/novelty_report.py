@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from diagnose.report.markdown import table_lines
-from diagnose.scoring.alarm_threshold import FALSE_ALARMS, LEAST_HEALTHY
-from diagnose.scoring.judged import drawn_text, interval_text
+from diagnose.scoring.alarms import FALSE_ALARMS, LEAST_HEALTHY
+from diagnose.scoring.intervals import drawn_text, interval_text
 from diagnose.studies.novelty import SCORE_LABELS
 from diagnose.studies.novelty_metrics import TRUE_POSITIVES
 from diagnose.studies.result_files import Content
+from gensig.text.markdown import table_lines
 from gensig.text.page import Section, Table
 
 QUESTIONS = {

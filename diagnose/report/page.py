@@ -15,7 +15,6 @@ from diagnose.report.control_sections import controls_section
 from diagnose.report.fault_answers import fault_answers, fault_section
 from diagnose.report.figures import confusion_figure, reliability_figure, scores_figure
 from diagnose.report.headlines import headlines
-from diagnose.report.markdown import table_lines
 from diagnose.report.methods import explained_methods, score_columns
 from diagnose.report.novelty_report import novelty_sections, novelty_tables
 from diagnose.report.text import (
@@ -37,6 +36,7 @@ from diagnose.report.text import (
 from diagnose.studies.result_files import Content
 from diagnose.training.entries import entry_notes
 from diagnose.training.heads import heads_notes
+from gensig.text.markdown import table_lines
 from gensig.text.page import Section, Table
 
 LEAKY_MEANING = (

@@ -9,9 +9,8 @@ import numpy as np
 from diagnose.data.protocols import left_out_lines
 from diagnose.report.methods import controls_on_cards, rivals_on_cards
 from diagnose.report.novelty_report import novelty_caveats
-from diagnose.scoring.judged import drawn_text, interval_text, too_few_text
+from diagnose.scoring.intervals import drawn_text, interval_text, is_above, too_few_text
 from diagnose.scoring.machines import LEAST_UNITS, MACHINES, Support
-from diagnose.scoring.metrics import is_above
 from diagnose.studies.result_files import Content
 from diagnose.studies.verdicts import failed_controls
 from gensig.text.page import Card, Section, Table

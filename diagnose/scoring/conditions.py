@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,15 +10,9 @@ from numpy.typing import NDArray
 
 from diagnose.data.groups import Group, groups_of
 from diagnose.data.windows import FloatArray, IntArray
-from diagnose.scoring.judged import (
-    Judged,
-    finite,
-    interval_text,
-    resampled_score,
-    score,
-    with_interval,
-)
-from diagnose.scoring.machines import CountArray, Support
+from diagnose.scoring.intervals import finite, interval_text, with_interval
+from diagnose.scoring.judged import Judged, drawn_scores, score
+from diagnose.scoring.machines import CountArray
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
@@ -100,25 +93,23 @@ def by_condition(
     network = methods[0]
     drawn = network.machines.drawn(n_bootstrap, rng)
     rows: list[dict[str, Any]] = []
-    tested: list[_Compared] = []
-    n_groups = int(np.clip(network.label.size // RECORDS_A_GROUP, 1, MOST_GROUPS))
+    tested: list[tuple[dict[str, Any], FloatArray, int]] = []
+    n_groups = int(np.clip(network.truth.size // RECORDS_A_GROUP, 1, MOST_GROUPS))
     for column, values in columns.items():
         groups = groups_of(values, most=n_groups)
         if len(groups) < 2:
             continue
-        measure = _measure(network.label, groups)
+        measure = _measure(network.truth, groups)
         for group in groups:
             compared = _compared(column, group, measure, methods, drawn, rng)
-            rows.append(compared.row)
-            if compared.row["difference_from_rest"] is not None:
+            rows.append(compared[0])
+            if compared[0]["difference_from_rest"] is not None:
                 tested.append(compared)
-    for compared in tested:
-        row, spread = compared.row, _standard_error(network, compared)
-        factor = _factor(len(tested), compared.support.n_groups)
+    for row, differences, n_machines in tested:
+        spread = _standard_error(network, row, differences, n_machines)
+        factor = _factor(len(tested), n_machines)
         row["difference_at_most"] = row["difference_from_rest"] + factor * spread
-    weak = [
-        compared.row for compared in tested if compared.row["difference_at_most"] < 0
-    ]
+    weak = [row for row, *_ in tested if row["difference_at_most"] < 0]
     weak.sort(key=lambda row: row["difference_at_most"])
     return {
         "rows": rows,
@@ -128,22 +119,6 @@ def by_condition(
     }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Compared:
-    """One group of records against the rest.
-
-    Attributes
-    ----------
-    row : of ``metrics.json``
-    differences : (resample,) of the first method, group less rest
-    support : groups of machines behind the score of the group
-    """
-
-    row: dict[str, Any]
-    differences: FloatArray
-    support: Support
-
-
 def _compared(
     column: str,
     group: Group,
@@ -151,22 +126,24 @@ def _compared(
     methods: Sequence[Judged],
     drawn: CountArray,
     rng: np.random.Generator,
-) -> _Compared:
-    """One group of records against the rest."""
+) -> tuple[dict[str, Any], FloatArray, int]:
+    """One group of records against the rest.
+
+    Returns
+    -------
+    row of ``metrics.json``, (resample,) differences of the first method, group less rest, and the
+    groups of machines behind the score of the group
+    """
     network = methods[0]
-    scores, resampled = {}, []
     support = network.of(group.member).support
-    for method in methods:
-        part = method.of(group.member)
-        values = resampled_score(part, measure, drawn, rng)
-        scores[method.method] = with_interval(score(part, measure), values, support)
-        resampled.append(values)
+    values = [
+        drawn_scores(method.of(group.member), measure, drawn, rng) for method in methods
+    ]
     rest = network.of(~group.member)
-    differences = resampled[0] - resampled_score(rest, measure, drawn, rng)
+    differences = values[0] - drawn_scores(rest, measure, drawn, rng)
     difference = None
     if support.too_few is None and rest.support.too_few is None:
-        inside = score(network.of(group.member), measure)
-        difference = finite(inside - score(rest, measure))
+        difference = finite(differences[0])
     row = {
         "column": column,
         "group": group.text,
@@ -175,11 +152,14 @@ def _compared(
         "n_records": int(group.member.sum()),
         "n_units": int(np.unique(network.unit[group.member]).size),
         "measure": measure,
-        "scores": scores,
+        "scores": {
+            method.method: with_interval(scores, support)
+            for method, scores in zip(methods, values, strict=True)
+        },
         "difference_from_rest": difference,
         "difference_at_most": None,
     }
-    return _Compared(row=row, differences=differences, support=support)
+    return row, differences[1:], support.n_groups
 
 
 def _measure(label: IntArray, groups: Sequence[Group]) -> str:
@@ -191,13 +171,14 @@ def _measure(label: IntArray, groups: Sequence[Group]) -> str:
     return "balanced_accuracy"
 
 
-def _standard_error(network: Judged, compared: _Compared) -> float:
+def _standard_error(
+    network: Judged, row: Mapping[str, Any], differences: FloatArray, n_groups: int
+) -> float:
     """Standard error of the difference between a group and the rest."""
-    overall = score(network, compared.row["measure"])
-    n_inside, n_groups = compared.row["n_records"], compared.support.n_groups
-    n_outside = network.label.size - n_inside
+    overall, n_inside = score(network, row["measure"]), row["n_records"]
+    n_outside = network.truth.size - n_inside
     of_records = np.sqrt(overall * (1 - overall) * (1 / n_inside + 1 / n_outside))
-    spread = np.nanstd(compared.differences)
+    spread = np.nanstd(differences)
     of_machines = spread * np.sqrt(n_groups / (n_groups - 1))
     return float(max(of_machines, of_records))
 

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from diagnose.data.groups import groups_of
 from diagnose.data.windows import HEALTHY, FloatArray, IntArray
-from diagnose.scoring.alarm_threshold import (
+from diagnose.scoring.alarms import (
     FALSE_ALARMS,
     LEAST_HEALTHY,
+    Mask,
     alarm_threshold,
+    areas,
 )
 from diagnose.scoring.detection_curve import (
     LEAST_RECORDS,
@@ -24,21 +26,21 @@ from diagnose.scoring.detection_curve import (
     fit_curves,
     limits,
 )
-from diagnose.scoring.judged import (
+from diagnose.scoring.intervals import (
     Interval,
-    Judged,
     finite,
     interval_text,
+    is_above,
     share_with_interval,
     with_interval,
 )
+from diagnose.scoring.judged import Judged
 from diagnose.scoring.machines import CountArray, Support
-from diagnose.scoring.metrics import is_above
+from diagnose.scoring.metrics import ratio
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
-BoolArray = NDArray[np.bool_]
 Sizes = Mapping[
     str, FloatArray
 ]  # quantity -> (record,) values of the records of a class
@@ -113,7 +115,7 @@ class _Alarms:
     """
 
     judged: Judged
-    healthy: BoolArray
+    healthy: Mask
     scores: FloatArray
     drawn: CountArray
     seeds: IntArray
@@ -121,51 +123,29 @@ class _Alarms:
     detected: FloatArray
     has_threshold: bool
 
-    def n_units(self, member: BoolArray) -> int:
+    def n_units(self, member: Mask) -> int:
         """Number of units of some records."""
         return int(np.unique(self.judged.unit[member]).size)
 
-    def support(self, member: BoolArray) -> Support:
+    def support(self, member: Mask) -> Support:
         """Groups of machines behind some records."""
         return self.judged.of(member).support
 
-    def share(self, member: BoolArray) -> Interval:
+    def share(self, member: Mask) -> Interval:
         """Share of some records that raise an alarm."""
         weight = self.weight[:, member]
         alarms = (weight * self.detected[:, member]).sum(axis=1)
-        shares = _ratio(alarms, weight.sum(axis=1))
-        return share_with_interval(float(shares[0]), shares[1:], self.support(member))
+        shares = ratio(alarms, weight.sum(axis=1))
+        return share_with_interval(shares, self.support(member))
 
-    def area(self, faulty: BoolArray) -> Interval:
-        """Area under the ROC curve, mean over the trainings drawn.
+    def area(self, faulty: Mask) -> Interval:
+        """Area under the ROC curve, mean over the trainings drawn."""
+        unit = self.judged.unit
+        of_seeds = areas(self.scores, faulty, self.healthy, unit, self.drawn)
+        area = np.take_along_axis(of_seeds, self.seeds, axis=1).mean(axis=1)
+        return with_interval(area, self.support(faulty))
 
-        It is the share of pairs of a faulty and a healthy record in which the faulty one scores
-        higher; ties count half. Pairs are counted once for each pair of units, then weighted by
-        the number of times that both were drawn.
-        """
-        judged, healthy = self.judged, self.healthy
-        pairs = np.zeros((judged.n_units, judged.n_units))
-        unit = judged.unit
-        np.add.at(pairs, (unit[healthy][:, None], unit[faulty][None]), 1.0)
-        n_pairs = self._over_pairs(pairs)
-        areas = np.full((len(self.drawn), judged.n_seeds), np.nan)
-        for seed, values in enumerate(self.scores):
-            won = np.zeros_like(pairs)
-            for index in np.unique(unit[healthy]):
-                ordered = np.sort(values[healthy & (unit == index)])
-                smaller = np.searchsorted(ordered, values[faulty], "left")
-                not_larger = np.searchsorted(ordered, values[faulty], "right")
-                below = (smaller + not_larger) / 2
-                won[index] = np.bincount(unit[faulty], below, judged.n_units)
-            areas[:, seed] = _ratio(self._over_pairs(won), n_pairs)
-        area = np.take_along_axis(areas, self.seeds, axis=1).mean(axis=1)
-        return with_interval(area[0], area[1:], self.support(faulty))
-
-    def _over_pairs(self, pairs: FloatArray) -> FloatArray:
-        """(1 + resample,) sum of a table of pairs of units."""
-        return np.einsum("bu,bv,uv->b", self.drawn, self.drawn, pairs, optimize=True)
-
-    def of_class(self, member: BoolArray, sizes: Sizes) -> dict[str, Any]:
+    def of_class(self, member: Mask, sizes: Sizes) -> dict[str, Any]:
         """Results of one class, without its summary."""
         result: dict[str, Any] = {
             "n_records": int(member.sum()),
@@ -188,7 +168,7 @@ class _Alarms:
         return result
 
     def by_severity(
-        self, severity: FloatArray | None, member: BoolArray
+        self, severity: FloatArray | None, member: Mask
     ) -> list[dict[str, Any]]:
         """Share found and share given the right class in groups of severity.
 
@@ -198,7 +178,7 @@ class _Alarms:
             return []
         judged = self.judged
         rows = []
-        right = (judged.predicted == judged.label).mean(axis=0)
+        right = (judged.predicted == judged.truth).mean(axis=0)
         most = int(np.clip(severity.size // RECORDS_A_GROUP, 2, MOST_GROUPS))
         for group in groups_of(severity, most=most):
             inside = np.zeros_like(member)
@@ -214,11 +194,6 @@ class _Alarms:
                 }
             )
         return rows
-
-
-def _ratio(part: FloatArray, total: FloatArray) -> FloatArray:
-    """Quotient of two arrays; NaN for a total of 0."""
-    return np.divide(part, total, out=np.full(total.shape, np.nan), where=total > 0)
 
 
 def detection(
@@ -246,7 +221,7 @@ def detection(
     rng : source of the resamples
     """
     healthy = list(class_names).index(HEALTHY)
-    scores = detection_score(judged.log_probability, healthy)
+    scores = detection_score(judged.answers, healthy)
     drawn = _drawn(judged, n_bootstrap, rng)
     missing = why_no_threshold(held_back)
     thresholds = np.full((1 + n_bootstrap, judged.n_seeds), np.nan)
@@ -256,7 +231,7 @@ def detection(
     seeds = np.concatenate([np.arange(judged.n_seeds)[None], resampled_seeds])
     alarms = _Alarms(
         judged=judged,
-        healthy=judged.label == healthy,
+        healthy=judged.truth == healthy,
         scores=scores,
         drawn=drawn,
         seeds=seeds,
@@ -267,7 +242,7 @@ def detection(
     false_alarms = alarms.share(alarms.healthy)
     classes = {}
     for index, name in enumerate(class_names):
-        member = judged.label == index
+        member = judged.truth == index
         if index != healthy and member.any():
             result = alarms.of_class(member, sizes.get(name, {}))
             result["summary"] = _sentence(name, result, false_alarms, missing)
@@ -286,7 +261,7 @@ def detection(
 
 def why_no_threshold(held_back: Judged | None) -> str | None:
     """Reason why healthy records of validation machines give no threshold; None if they do."""
-    n_records = 0 if held_back is None else held_back.label.size
+    n_records = 0 if held_back is None else held_back.truth.size
     if n_records >= LEAST_HEALTHY:
         return None
     return (
@@ -301,7 +276,7 @@ def _source(held_back: Judged | None) -> str:
     if held_back is None:
         return "no healthy record of a validation machine"
     n_units = np.unique(held_back.unit).size
-    return f"{held_back.label.size} healthy records of {n_units} validation machines"
+    return f"{held_back.truth.size} healthy records of {n_units} validation machines"
 
 
 def _drawn(judged: Judged, n_bootstrap: int, rng: np.random.Generator) -> CountArray:
@@ -316,7 +291,7 @@ def _thresholds(
     """(1 + resample, seed) thresholds, all machines once and then resampled."""
     weight = _drawn(held_back, n_bootstrap, rng)[:, held_back.unit]
     weight[weight.sum(axis=1) == 0] = 1  # a resample without a healthy record
-    scores = detection_score(held_back.log_probability, healthy)
+    scores = detection_score(held_back.answers, healthy)
     return np.stack([alarm_threshold(row, weight) for row in scores], axis=1)
 
 
@@ -352,7 +327,7 @@ def _limit_rows(
     rows = []
     for share in SHARES:
         values = limits(coefficients, size, share)
-        interval = with_interval(values[0], values[1:], support)
+        interval = with_interval(values, support)
         status = "reached"
         if values[0] == size.min():
             status = "at_smallest_tested"

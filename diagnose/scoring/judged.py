@@ -1,68 +1,55 @@
-"""Predictions of a method for the test records of a protocol, and scores on resamples."""
+"""Answers of a method beside the truth: the table that scores are functions of."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypedDict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.windows import FloatArray, IntArray
-from diagnose.scoring.machines import MACHINES, CountArray, Machines, Support
-from diagnose.scoring.metrics import balanced_accuracy, over_drawn_seeds
+from diagnose.scoring.machines import CountArray, Machines, Support, machines_of
+from diagnose.scoring.metrics import (
+    MEASURES,
+    SCORES,
+    over_drawn_seeds,
+    recall,
+    score_with_interval,
+)
+from diagnose.scoring.predictions import Prediction
 
+if TYPE_CHECKING:
+    from diagnose.data.windows import Task
 
-class Interval(TypedDict):
-    """Value with its 95 % interval; ``too_few`` names the groups that are too few for one."""
-
-    mean: float | None
-    low: float | None
-    high: float | None
-    too_few: str | None
-
-
-def share_right(confusion: CountArray) -> FloatArray:
-    """(...) share of right predictions, from counts (..., true, predicted).
-
-    NaN without any record.
-    """
-    total = confusion.sum(axis=(-2, -1))
-    right = np.trace(confusion, axis1=-2, axis2=-1).astype(float)
-    return np.divide(right, total, out=np.full(total.shape, np.nan), where=total > 0)
-
-
-MEASURES: dict[str, Callable[[CountArray], FloatArray]] = {
-    "balanced_accuracy": balanced_accuracy,
-    "share_right": share_right,
-}
+BOOTSTRAP_SEED = 20240607
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """Predictions of one method for test records.
+    """Answers of one method for records, with the truth.
 
     Attributes
     ----------
     method : its name
-    label : (record,) true class
+    truth : (record,) class, or h of remaining life
     unit : (record,) 0 to n_units - 1, the unit of each record
     machines : the units of the whole test part
-    log_probability : (seed, record, class), or scores that rank in the same order; one seed for a
-        method without seeds
+    answers : (seed, record, output) as `diagnose.scoring.predictions.Prediction.answers`; one seed
+        for a method without seeds
     """
 
     method: str
-    label: IntArray
+    truth: NDArray[Any]
     unit: IntArray
     machines: Machines
-    log_probability: FloatArray
+    answers: FloatArray
 
     @property
     def predicted(self) -> IntArray:
         """(seed, record) the most probable class."""
-        return self.log_probability.argmax(axis=-1)
+        return self.answers.argmax(axis=-1)
 
     @property
     def n_units(self) -> int:
@@ -77,32 +64,82 @@ class Judged:
     @property
     def n_seeds(self) -> int:
         """Number of trainings."""
-        return int(self.log_probability.shape[0])
+        return int(self.answers.shape[0])
 
     def of(self, records: IntArray | NDArray[np.bool_]) -> Judged:
         """The same method on some of the records, with the same numbers of the units."""
         return replace(
             self,
-            label=self.label[records],
+            truth=self.truth[records],
             unit=self.unit[records],
-            log_probability=self.log_probability[:, records],
+            answers=self.answers[:, records],
         )
 
     def confusion(self) -> CountArray:
         """Counts of records, (seed, unit, true class, predicted class)."""
-        n_classes = self.log_probability.shape[-1]
+        n_classes = self.answers.shape[-1]
         counts = np.zeros(
             (self.n_seeds, self.n_units, n_classes, n_classes), dtype=np.int64
         )
         for seed, predicted in enumerate(self.predicted):
-            np.add.at(counts[seed], (self.unit, self.label, predicted), 1)
+            np.add.at(counts[seed], (self.unit, self.truth, predicted), 1)
         return counts
 
 
-def resampled_score(
+def judged_runs(
+    task: Task,
+    runs: Sequence[Prediction],
+    record: IntArray | None = None,
+    *,
+    further: str | None = None,
+    truth: NDArray[Any] | None = None,
+) -> Judged:
+    """Answers of the trainings of a method for test records.
+
+    Parameters
+    ----------
+    task : gives classes and machines
+    runs : one a seed, of the same records
+    record : some of them, sorted; None: all
+    further : key of `diagnose.scoring.predictions.Prediction.further`; None: the answers themselves
+    truth : (record,) of these; None: their classes
+    """
+    tables = [run.answers if further is None else run.further[further] for run in runs]
+    if record is None:
+        record = runs[0].record
+    answers = [
+        table[np.searchsorted(run.record, record)]
+        for table, run in zip(tables, runs, strict=True)
+    ]
+    return judged_answers(task, runs[0].method, record, np.stack(answers), truth)
+
+
+def judged_answers(
+    task: Task,
+    method: str,
+    record: IntArray,
+    answers: FloatArray,
+    truth: NDArray[Any] | None = None,
+) -> Judged:
+    """Answers (seed, record, output) for records; ``truth`` None: their classes."""
+    unit = np.asarray(task.dataset.column("unit_id"))[record]
+    if truth is None:
+        truth = task.labels()[record]
+    return Judged(
+        method=method,
+        truth=truth,
+        unit=np.unique(unit, return_inverse=True)[1],
+        machines=machines_of(task.dataset, record),
+        answers=answers,
+    )
+
+
+def drawn_scores(
     judged: Judged, measure: str, drawn: CountArray, rng: np.random.Generator
 ) -> FloatArray:
-    """(resample,) score of `MEASURES`, mean over resampled seeds; NaN without a drawn record.
+    """(1 + resample,) score of all machines and seeds, then of resampled ones, see `MEASURES`.
+
+    NaN where a resample draws no record.
 
     Parameters
     ----------
@@ -113,7 +150,8 @@ def resampled_score(
     rng : draws the seeds
     """
     counts = np.einsum("bu,sutp->bstp", drawn, judged.confusion())
-    return over_drawn_seeds(MEASURES[measure](counts), rng)
+    resampled = over_drawn_seeds(MEASURES[measure](counts), rng)
+    return np.concatenate([[score(judged, measure)], resampled])
 
 
 def score(judged: Judged, measure: str) -> float:
@@ -121,108 +159,35 @@ def score(judged: Judged, measure: str) -> float:
     return float(MEASURES[measure](judged.confusion().sum(axis=1)).mean())
 
 
-def with_interval(value: float, resampled: FloatArray, support: Support) -> Interval:
-    """Value with its 95 % percentile interval, which is None for few groups of machines.
+def class_scores(
+    judged: Judged,
+    class_names: Sequence[str],
+    n_bootstrap: int,
+    *,
+    shuffled: bool = False,
+) -> dict[str, Any]:
+    """Scores of one method with intervals over machines, confusion counts and recall.
 
     Parameters
     ----------
-    value : of all machines
-    resampled : (resample,) values of resampled machines; NaN if a resample has none
-    support : groups behind the value; `diagnose.scoring.machines.LEAST_UNITS` are needed
-
-    Source: Efron & Tibshirani (1993), section 13.3.
+    n_bootstrap : resamples of the machines
+    shuffled : see `diagnose.scoring.metrics.score_with_interval`
     """
-    known = resampled[~np.isnan(resampled)]
-    low, high = np.nan, np.nan
-    if support.too_few is None and known.size:
-        low, high = np.quantile(known, [0.025, 0.975], method="inverted_cdf")
-    return {
-        "mean": finite(value),
-        "low": finite(low),
-        "high": finite(high),
-        "too_few": support.too_few,
+    confusion = judged.confusion()
+    rng = np.random.default_rng(BOOTSTRAP_SEED)
+    scores: dict[str, Any] = {
+        name: score_with_interval(
+            name,
+            confusion,
+            n_bootstrap=n_bootstrap,
+            rng=rng,
+            machines=judged.machines,
+            shuffled=shuffled,
+        )
+        for name in SCORES
     }
-
-
-def share_with_interval(
-    value: float, resampled: FloatArray, support: Support
-) -> Interval:
-    """A share of records with its interval.
-
-    It is the exact interval of as many independent trials as there are groups of machines, extended
-    to that of `with_interval`, which has the spread of trainings and thresholds too. A resample of
-    few groups cannot show what none of them did.
-
-    Source: Clopper & Pearson (1934), "The use of confidence or fiducial limits illustrated in the
-    case of the binomial", Biometrika 26 (4).
-    """
-    interval = with_interval(value, resampled, support)
-    ends = interval["low"], interval["high"]
-    interval["low"], interval["high"] = extended(*ends, value, support)
-    return interval
-
-
-def extended(
-    low: float | None, high: float | None, share: float, support: Support
-) -> tuple[float | None, float | None]:
-    """Ends of the interval of a share, extended to those of `exact_interval`.
-
-    None stays, as of too few groups.
-    """
-    if low is None or high is None:
-        return low, high
-    exact = exact_interval(share, support.n_groups)
-    return min(low, exact[0]), max(high, exact[1])
-
-
-def exact_interval(share: float, n_trials: int) -> tuple[float, float]:
-    """95 % interval of a share of independent trials, which need not be a whole number of them.
-
-    Source: as `share_with_interval`; its quantiles of the beta distribution take any share.
-    """
-    from scipy.stats import beta
-
-    hits = share * n_trials
-    misses = n_trials - hits
-    low, high = 0.0, 1.0
-    if hits > 0:
-        low = float(beta.ppf(0.025, hits, misses + 1))
-    if misses > 0:
-        high = float(beta.ppf(0.975, hits + 1, misses))
-    return low, high
-
-
-def finite(value: float) -> float | None:
-    """A number that JSON can hold; None for one that is not finite."""
-    return float(value) if np.isfinite(value) else None
-
-
-def interval_text(scored: Mapping[str, Any], form: str = ".2f") -> str:
-    """Value and interval in words, as ``0.53 [0.46, 0.59]``, or with `too_few_text`."""
-    mean, low, high = (scored[key] for key in ("mean", "low", "high"))
-    if mean is None:
-        return "unknown"
-    if low is None and high is None:
-        return f"{mean:{form}} [{too_few_text(scored)}]"
-    ends = ["?" if end is None else f"{end:{form}}" for end in (low, high)]
-    return f"{mean:{form}} [{ends[0]}, {ends[1]}]"
-
-
-def too_few_text(scored: Mapping[str, Any]) -> str:
-    """Reason why a score has no interval, as ``too few sets of gears``."""
-    return f"too few {scored.get('too_few') or MACHINES}"
-
-
-def drawn_text(resampled: Mapping[str, int]) -> str:
-    """Names of what an interval resamples, of `diagnose.scoring.machines.Machines.counts`."""
-    return " and ".join(resampled)
-
-
-def spread_text(
-    scored: Mapping[str, Any], resampled: Mapping[str, int], form: str
-) -> str:
-    """Interval of a score in words, with what it resamples, or why there is none."""
-    low, high = scored["low"], scored["high"]
-    if low is None or high is None:
-        return f"no 95 % interval: {too_few_text(scored)}"
-    return f"95 % interval over {drawn_text(resampled)} {low:{form}} to {high:{form}}"
+    total = confusion.sum(axis=(0, 1))
+    shares = zip(class_names, recall(total).tolist(), strict=True)
+    scores["confusion"] = total.tolist()
+    scores["recall"] = {name: share for name, share in shares if np.isfinite(share)}
+    return scores

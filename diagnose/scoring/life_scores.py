@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.windows import FloatArray
+from diagnose.scoring.hours import LifeFacts, interval
+from diagnose.scoring.intervals import Interval, with_interval
+from diagnose.scoring.judged import Judged
 from diagnose.scoring.machines import Machines
-from diagnose.scoring.metrics import spread_of
+from diagnose.scoring.metrics import ratio
 
 EARLY, LATE = 13.0, 10.0  # units of error in which the score grows e-fold, of PHM 2008
 UNITS = 125.0  # of the score in the early level: cycles at which C-MAPSS studies usually cut
@@ -27,51 +29,6 @@ MEASURES = (
     "width_h",
     "horizon_h",
 )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Snapshots:
-    """Test records of lives that failed, with the predictions of one trained method.
-
-    Attributes
-    ----------
-    life : (record,) 0 to n_lives - 1
-    true, said : (record,) h, true and predicted remaining life, both cut at the early level
-    half_width : h, of the interval about the prediction
-    early_life : h
-    """
-
-    life: NDArray[np.integer]
-    true: FloatArray
-    said: FloatArray
-    half_width: float
-    early_life: float
-
-    @property
-    def low(self) -> FloatArray:
-        """(record,) h lower ends of the intervals."""
-        return interval(self.said, self.half_width, self.early_life)[0]
-
-    @property
-    def high(self) -> FloatArray:
-        """(record,) h upper ends."""
-        return interval(self.said, self.half_width, self.early_life)[1]
-
-
-def interval(
-    predicted: FloatArray, half_width: float, early_life: float
-) -> tuple[FloatArray, FloatArray]:
-    """Lower and upper ends in h about predictions, (...) each.
-
-    The early level stands for itself and all longer lives.
-    """
-    low = np.maximum(predicted - half_width, 0.0)
-    return low, np.minimum(predicted + half_width, early_life)
-
-
-def intervals_hold(n_lives: int, coverage: float) -> bool:
-    """True if the calibration lives are enough for a coverage, see `conformal_half_width`."""
-    return bool((n_lives + 1) * (1 - coverage) >= 1 - 1e-9)
 
 
 def phm_score(error: FloatArray, early_life: float) -> FloatArray:
@@ -131,33 +88,46 @@ def conformal_half_width(
     return float(min(error[order][reached], default=np.inf))
 
 
-def by_life(snapshots: Snapshots) -> dict[str, NDArray[Any]]:
-    """Values (life,) behind each of `MEASURES`: means over the snapshots of a life.
+def by_life(judged: Judged, hours: Sequence[LifeFacts]) -> dict[str, NDArray[Any]]:
+    """Values (seed, life) behind each of `MEASURES`: means over the snapshots of a life.
 
     For the RMSE they are mean squared errors.
+
+    Parameters
+    ----------
+    judged : snapshots of lives that failed, true and predicted h cut at the early level
+    hours : of each training
     """
-    error = snapshots.said - snapshots.true
-    inside = (snapshots.low <= snapshots.true) & (snapshots.true <= snapshots.high)
+    rows = [
+        _by_life(judged.unit, judged.truth, said, facts)
+        for said, facts in zip(judged.answers[..., 0], hours, strict=True)
+    ]
+    return {measure: np.stack([row[measure] for row in rows]) for measure in rows[0]}
+
+
+def _by_life(
+    unit: NDArray[np.integer], true: FloatArray, said: FloatArray, facts: LifeFacts
+) -> dict[str, NDArray[Any]]:
+    """Values (life,) of one training."""
+    level, error = facts.early_life_h, said - true
+    low, high = interval(said, facts.half_width_h, level)
     rows = {
         "rmse_h": error**2,
         "mae_h": np.abs(error),
-        "phm_score": phm_score(error, snapshots.early_life),
-        "coverage": inside.astype(float),
-        "width_h": snapshots.high - snapshots.low,
+        "phm_score": phm_score(error, level),
+        "coverage": ((low <= true) & (true <= high)).astype(float),
+        "width_h": high - low,
     }
-    counts = np.bincount(snapshots.life)
-    band = BAND * snapshots.early_life
+    counts = np.bincount(unit)
     last, horizon = np.empty(counts.size), np.empty(counts.size)
     for life in range(counts.size):
-        member = snapshots.life == life
-        true, predicted = snapshots.true[member], snapshots.said[member]
+        member = unit == life
         # at the failure itself there is nothing left to predict
-        nearest = np.argmin(np.where(true > 0, true, np.inf))
+        nearest = np.argmin(np.where(true[member] > 0, true[member], np.inf))
         last[life] = rows["phm_score"][member][nearest]
-        horizon[life] = prognostic_horizon(true, predicted, band)
+        horizon[life] = prognostic_horizon(true[member], said[member], BAND * level)
     means = {
-        name: np.bincount(snapshots.life, weights=row) / counts
-        for name, row in rows.items()
+        name: np.bincount(unit, weights=row) / counts for name, row in rows.items()
     }
     return means | {"phm_score_last": last, "horizon_h": horizon}
 
@@ -182,9 +152,8 @@ def life_scores(
     lives, seeds = drawn(n_seeds, machines, n_bootstrap, rng)
     scores = {}
     for name, table in values.items():
-        mean = _finished(name, table.mean(axis=1)).mean()
-        resampled = _over_drawn(name, table, lives, seeds)
-        scores[name] = spread_of(mean, resampled, machines.support())
+        drawn_means = _over_drawn(name, table, lives, seeds)
+        scores[name] = with_interval(drawn_means, machines.support(), "linear")
     return scores
 
 
@@ -195,7 +164,7 @@ def gain(
     machines: Machines,
     n_bootstrap: int,
     rng: np.random.Generator,
-) -> dict[str, Any]:
+) -> Interval:
     """RMSE of ``against`` less that of ``values``, in h: above 0 is better.
 
     Both are (seed, life) squared errors, scored on the same resamples of the lives. `low` and
@@ -205,8 +174,7 @@ def gain(
     other_seeds = rng.integers(against.shape[0], size=(n_bootstrap, against.shape[0]))
     of_other = _over_drawn("rmse_h", against, lives, other_seeds)
     of_values = _over_drawn("rmse_h", values, lives, seeds)
-    mean = np.sqrt(against.mean(axis=1)).mean() - np.sqrt(values.mean(axis=1)).mean()
-    return spread_of(mean, of_other - of_values, machines.support())
+    return with_interval(of_other - of_values, machines.support(), "linear")
 
 
 def drawn(
@@ -222,12 +190,11 @@ def drawn(
 
 
 def _over_drawn(name: str, table: FloatArray, lives: Any, seeds: Any) -> FloatArray:
-    """(draw,) the measure of resampled lives, mean over the seeds drawn."""
-    total = lives.sum(axis=1, keepdims=True)
-    nothing = np.full((len(lives), table.shape[0]), np.nan)
-    means = np.divide(lives @ table.T, total, out=nothing, where=total > 0)
-    by_seed = _finished(name, means)
-    return np.take_along_axis(by_seed, seeds, axis=1).mean(axis=1)
+    """(1 + draw,) the measure of all lives and seeds, then of those drawn."""
+    means = ratio(lives @ table.T, lives.sum(axis=1, keepdims=True))
+    resampled = np.take_along_axis(_finished(name, means), seeds, axis=1).mean(axis=1)
+    mean = _finished(name, table.mean(axis=1)).mean()
+    return np.concatenate([[mean], resampled])
 
 
 def _finished(name: str, mean: FloatArray) -> FloatArray:

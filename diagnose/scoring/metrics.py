@@ -3,32 +3,15 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.windows import FloatArray, IntArray
-from diagnose.scoring.machines import CountArray, Machines, Support
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Score:
-    """Mean over seeds, the value of each seed, and the 95 % interval over machines.
-
-    Attributes
-    ----------
-    low, high : None for fewer groups than `diagnose.scoring.machines.LEAST_UNITS`
-    too_few : kind of these groups then
-    """
-
-    mean: float
-    low: float | None
-    high: float | None
-    per_seed: tuple[float, ...]
-    too_few: str | None = None
+from diagnose.scoring.intervals import Interval, of_seeds, with_interval
+from diagnose.scoring.machines import CountArray, Machines
 
 
 def over_records(
@@ -62,14 +45,19 @@ def confusion_by_unit(
     return counts
 
 
+def ratio(part: NDArray[Any], total: NDArray[Any]) -> FloatArray:
+    """Quotient of two arrays of shapes that fit; NaN for a total of 0."""
+    shape = np.broadcast_shapes(part.shape, total.shape)
+    return np.divide(part, total, out=np.full(shape, np.nan), where=total > 0)
+
+
 def recall(confusion: CountArray) -> FloatArray:
     """(..., class) share of each true class found, from counts (..., true, predicted).
 
     NaN for an absent class.
     """
-    totals = confusion.sum(axis=-1)
-    hits = np.diagonal(confusion, axis1=-2, axis2=-1).astype(float)
-    return np.divide(hits, totals, out=np.full(totals.shape, np.nan), where=totals > 0)
+    hits = np.diagonal(confusion, axis1=-2, axis2=-1)
+    return ratio(hits, confusion.sum(axis=-1))
 
 
 def balanced_accuracy(confusion: CountArray) -> FloatArray:
@@ -88,7 +76,22 @@ def macro_f1(confusion: CountArray) -> FloatArray:
     return _nanmean(f1)
 
 
-SCORES = {"balanced_accuracy": balanced_accuracy, "macro_f1": macro_f1}
+def share_right(confusion: CountArray) -> FloatArray:
+    """(...) share of right predictions, from counts (..., true, predicted).
+
+    NaN without any record.
+    """
+    right = np.trace(confusion, axis1=-2, axis2=-1)
+    return ratio(right, confusion.sum(axis=(-2, -1)))
+
+
+MEASURES: dict[str, Callable[[CountArray], FloatArray]] = {
+    "balanced_accuracy": balanced_accuracy,
+    "macro_f1": macro_f1,
+    "share_right": share_right,
+}
+ACCURACY = "balanced_accuracy"
+SCORES = (ACCURACY, "macro_f1")  # of every method, in ``metrics.json``
 
 
 def score_with_interval(
@@ -99,23 +102,23 @@ def score_with_interval(
     rng: np.random.Generator,
     machines: Machines | None = None,
     shuffled: bool = False,
-) -> Score:
+) -> dict[str, Any]:
     """Score with a 95 % interval by bootstrap over machines, or over what they share.
 
     Parameters
     ----------
-    name : key of `SCORES`
+    name : key of `MEASURES`
     confusion : (seed, unit, true class, predicted class) counts of records
     n_bootstrap : resamples of the machines, with all their records, and of the seeds
     rng : source of the resamples
     machines : of the units, in their order; None for units that share nothing
     shuffled : True for shuffled training labels; the interval then covers the luck of the shuffle
 
-    Source: percentile interval of Efron & Tibshirani (1993), "An introduction to the bootstrap",
-    section 13.3. With few groups it is too narrow: it is no wider than what those at hand show.
-    Fewer than `diagnose.scoring.machines.LEAST_UNITS` give none.
+    Returns
+    -------
+    as `diagnose.scoring.intervals.of_seeds`
     """
-    score = SCORES[name]
+    score = MEASURES[name]
     per_seed = score(confusion.sum(axis=1))
     machines = machines or Machines.alone(confusion.shape[1])
     support, drawn = machines.support(), machines.drawn(n_bootstrap, rng)
@@ -124,38 +127,7 @@ def score_with_interval(
         luck = _renaming_luck(name, confusion.sum(axis=1), n_bootstrap, rng)
         resampled = resampled + luck
     values = np.clip(over_drawn_seeds(resampled, rng), 0, 1)
-    low, high = percentile_interval(values, support)
-    return Score(
-        mean=float(np.mean(per_seed)),
-        low=low,
-        high=high,
-        per_seed=tuple(per_seed.tolist()),
-        too_few=support.too_few,
-    )
-
-
-def percentile_interval(
-    resampled: FloatArray, support: Support
-) -> tuple[float, float] | tuple[None, None]:
-    """95 % interval of (resample,) values, NaN left out; None for too few groups."""
-    if support.too_few:
-        return None, None
-    low, high = np.nanquantile(resampled, [0.025, 0.975])
-    return float(low), float(high)
-
-
-def spread_of(
-    mean: float, resampled: FloatArray, support: Support
-) -> dict[str, float | str | None]:
-    """A value with its `percentile_interval`: ``mean``, ``low``, ``high``, ``too_few``."""
-    low, high = percentile_interval(resampled, support)
-    ends = {"low": low, "high": high, "too_few": support.too_few}
-    return {"mean": float(mean), **ends}
-
-
-def is_above(score: Mapping[str, Any], level: float) -> bool:
-    """True if a whole interval lies above a level; False without an interval."""
-    return score["low"] is not None and bool(score["low"] > level)
+    return of_seeds(per_seed, values, support)
 
 
 def ratio_with_interval(
@@ -166,32 +138,27 @@ def ratio_with_interval(
     n_bootstrap: int,
     rng: np.random.Generator,
     machines: Machines | None = None,
-) -> dict[str, float | str | None]:
+) -> Interval:
     """Ratio of a score to that of a reference on the same machines, with a 95 % interval.
 
     Parameters
     ----------
-    name : key of `SCORES`
+    name : key of `MEASURES`
     confusion, reference : (seed, unit, true class, predicted class) counts of records; the same
         units in the same order. Both scores are means over their seeds
     n_bootstrap : resamples; each draws the machines once for both, and the seeds of each
     rng : source of the resamples
     machines : of the units, in their order; None for units that share nothing
-
-    Returns
-    -------
-    ``mean``, ``low``, ``high``, ``too_few``, as in `Score`
     """
-    score, machines = SCORES[name], machines or Machines.alone(confusion.shape[1])
+    score, machines = MEASURES[name], machines or Machines.alone(confusion.shape[1])
     support, drawn = machines.support(), machines.drawn(n_bootstrap, rng)
-    means, resampled = [], []
+    values = []
     for counts in (confusion, reference):
-        values = score(np.einsum("bu,sutp->bstp", drawn, counts))
-        resampled.append(over_drawn_seeds(values, rng))
-        means.append(np.mean(score(counts.sum(axis=1))))
+        resampled = score(np.einsum("bu,sutp->bstp", drawn, counts))
+        mean = score(counts.sum(axis=1)).mean()
+        values.append(np.concatenate([[mean], over_drawn_seeds(resampled, rng)]))
     least = np.finfo(float).tiny  # for a reference that finds nothing in a resample
-    ratios = resampled[0] / np.maximum(resampled[1], least)
-    return spread_of(means[0] / max(means[1], least), ratios, support)
+    return with_interval(values[0] / np.maximum(values[1], least), support, "linear")
 
 
 def over_drawn_seeds(resampled: FloatArray, rng: np.random.Generator) -> FloatArray:
@@ -212,7 +179,7 @@ def _renaming_luck(
     n_seeds, n_classes = confusion.shape[:2]
     names = rng.permuted(np.tile(np.arange(n_classes), (n_draws, n_seeds, 1)), axis=2)
     renamed = np.take_along_axis(confusion[None], names[:, :, None, :], axis=3)
-    scores = SCORES[name](renamed)
+    scores = MEASURES[name](renamed)
     return scores - scores.mean(axis=0)
 
 

@@ -8,15 +8,10 @@ from typing import Any
 import numpy as np
 
 from diagnose.data.windows import FloatArray
-from diagnose.scoring.judged import (
-    Judged,
-    resampled_score,
-    score,
-    too_few_text,
-    with_interval,
-)
+from diagnose.scoring.intervals import too_few_text, with_interval
+from diagnose.scoring.judged import Judged, drawn_scores
+from diagnose.scoring.metrics import ACCURACY
 
-ACCURACY = "balanced_accuracy"
 N_PERMUTATIONS = 9999  # all of them if there are fewer
 
 
@@ -48,11 +43,10 @@ def compare(
     rejective multiple test procedure", Scandinavian Journal of Statistics 6 (2).
     """
     drawn, support = network.machines.drawn(n_bootstrap, rng), network.support
-    of_network = resampled_score(network, ACCURACY, drawn, rng)
+    of_network = drawn_scores(network, ACCURACY, drawn, rng)
     rows: list[dict[str, Any]] = []
     for other in others:
-        difference = score(network, ACCURACY) - score(other, ACCURACY)
-        resampled = of_network - resampled_score(other, ACCURACY, drawn, rng)
+        difference = of_network - drawn_scores(other, ACCURACY, drawn, rng)
         rows.append(
             {
                 "method": network.method,
@@ -60,7 +54,7 @@ def compare(
                 "n_units": network.n_units,
                 "n_swapped": support.n_groups,
                 "swapped": support.kind,
-                "difference": with_interval(difference, resampled, support),
+                "difference": with_interval(difference, support),
                 "p_value": permutation_p_value(network, other, rng),
             }
         )
@@ -109,7 +103,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
 def _part_of_group(judged: Judged) -> FloatArray:
     """(group,) contribution of each group to the balanced accuracy, mean over the seeds."""
     hits = np.diagonal(judged.confusion(), axis1=-2, axis2=-1).mean(axis=0)
-    totals = np.bincount(judged.label, minlength=hits.shape[1])
+    totals = np.bincount(judged.truth, minlength=hits.shape[1])
     present = totals > 0
     of_unit = (hits[:, present] / totals[present]).sum(axis=1) / present.sum()
     group = judged.machines.coarsest().group

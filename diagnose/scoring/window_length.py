@@ -8,21 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.data.windows import FloatArray, IntArray
-from diagnose.scoring.judged import (
-    Interval,
-    Judged,
-    interval_text,
-    resampled_score,
-    score,
-    with_interval,
-)
-from diagnose.scoring.metrics import over_records
+from diagnose.data.windows import IntArray
+from diagnose.scoring.intervals import Interval, interval_text, with_interval
+from diagnose.scoring.judged import Judged, drawn_scores
+from diagnose.scoring.metrics import ACCURACY, over_records
+from diagnose.scoring.predictions import Rows
 
 
 def by_window_length(
     judged: Judged,
-    windows: Sequence[tuple[IntArray, FloatArray]],
+    windows: Sequence[Rows],
     *,
     window_seconds: float,
     step_seconds: float,
@@ -34,8 +29,7 @@ def by_window_length(
     Parameters
     ----------
     judged : the network on the test records, these sorted by their number
-    windows : for each seed, record (window,) and log-probabilities (window, class), windows of a
-        record in time order
+    windows : for each seed, those of a record in time order
     window_seconds, step_seconds : length of a window and step to the next one, s
     n_bootstrap, rng : resamples of the machines and their source
 
@@ -45,32 +39,29 @@ def by_window_length(
     gain : score by all windows less that by the first one, from the same resamples
     summary : one sentence
     """
-    positions = [_position_in_record(record) for record, _ in windows]
+    positions = [_position_in_record(part.record) for part in windows]
     longest = int(max(position.max() for position in positions)) + 1
     counts = [1 << power for power in range((longest - 1).bit_length())] + [longest]
     drawn, support = judged.machines.drawn(n_bootstrap, rng), judged.support
-    rows, resampled, scores = [], [], []
+    rows, scores = [], []
     for count in counts:
         by_record = []
-        for (record, scored), position in zip(windows, positions, strict=True):
+        for part, position in zip(windows, positions, strict=True):
             first = position < count
-            by_record.append(over_records(scored[first], record[first])[1])
-        part = replace(judged, log_probability=np.stack(by_record))
+            answers = over_records(part.answers[first], part.record[first])[1]
+            by_record.append(answers)
+        shorter = replace(judged, answers=np.stack(by_record))
         # the same seeds in every row, so that only the length differs
         seeds = np.random.default_rng(0)
-        values = resampled_score(part, "balanced_accuracy", drawn, seeds)
-        mean = score(part, "balanced_accuracy")
+        scores.append(drawn_scores(shorter, ACCURACY, drawn, seeds))
         rows.append(
             {
                 "n_windows": count,
                 "seconds": window_seconds + (count - 1) * step_seconds,
-                "balanced_accuracy": with_interval(mean, values, support),
+                ACCURACY: with_interval(scores[-1], support),
             }
         )
-        resampled.append(values)
-        scores.append(mean)
-    differences = resampled[-1] - resampled[0]
-    gain = with_interval(scores[-1] - scores[0], differences, support)
+    gain = with_interval(scores[-1] - scores[0], support)
     return {
         "method": judged.method,
         "rows": rows,

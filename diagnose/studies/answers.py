@@ -13,21 +13,22 @@ import numpy as np
 
 from diagnose.baselines.base import Role
 from diagnose.baselines.registry import baseline_names
-from diagnose.data.windows import (
-    FloatArray,
-    IntArray,
-    Task,
-)
+from diagnose.data.windows import FloatArray, IntArray, Task
 from diagnose.scoring.conditions import by_condition, condition_columns
 from diagnose.scoring.detection_limit import HEALTHY, detection, size_columns
-from diagnose.scoring.judged import Judged, resampled_score, score, with_interval
-from diagnose.scoring.machines import machines_of
-from diagnose.scoring.paired import ACCURACY, compare
-from diagnose.scoring.predictions import Prediction
+from diagnose.scoring.intervals import with_interval
+from diagnose.scoring.judged import (
+    Judged,
+    drawn_scores,
+    judged_answers,
+    judged_runs,
+)
+from diagnose.scoring.metrics import ACCURACY
+from diagnose.scoring.paired import compare
+from diagnose.scoring.predictions import WINDOWS, Prediction
 from diagnose.scoring.window_length import by_window_length
 from diagnose.settings import TrainSettings
 from diagnose.studies.controls import best_on_validation
-from diagnose.studies.counts import unit_ids
 from diagnose.studies.result_files import Entry, network_name
 
 ANSWERS_SEED = 20240608
@@ -55,9 +56,7 @@ def protocol_answers(
         if run.method in compared:
             runs.setdefault(run.method, []).append(run)
     record = reduce(np.intersect1d, [mine[0].record for mine in runs.values()])
-    rivals = {
-        method: _judged(task, method, mine, record) for method, mine in runs.items()
-    }
+    rivals = {method: judged_runs(task, mine, record) for method, mine in runs.items()}
     network = rivals.pop(name)
     best = rivals.get(best_on_validation(task, predictions, rivals) or "")
     shown = [method for method in (network, best) if method is not None]
@@ -85,12 +84,12 @@ def protocol_answers(
         result["detection"] = {
             method.method: detect(
                 method,
-                _held_back(task, method.method, runs[method.method]),
+                _held_back(task, runs[method.method]),
                 rng=_generator(),
             )
             for method in shown
         }
-    if any(run.windows is not None for run in runs[name]):
+    if any(WINDOWS in run.parts for run in runs[name]):
         result["window_length"] = _window_length(task, settings, runs[name])
     return result
 
@@ -110,21 +109,16 @@ def leak_answer(
     ----------
     leaky, clean : of the network, one a seed
     """
-    judged = [
-        _judged(task, runs[0].method, runs, runs[0].record) for runs in (leaky, clean)
-    ]
-    rng = _generator()
-    resampled = [
-        resampled_score(
-            one, ACCURACY, one.machines.drawn(settings.n_bootstrap, rng), rng
-        )
+    judged = [judged_runs(task, runs) for runs in (leaky, clean)]
+    rng, n_bootstrap = _generator(), settings.n_bootstrap
+    leaky_scores, clean_scores = (
+        drawn_scores(one, ACCURACY, one.machines.drawn(n_bootstrap, rng), rng)
         for one in judged
-    ]
-    difference = score(judged[0], ACCURACY) - score(judged[1], ACCURACY)
+    )
     support = min((one.support for one in judged), key=lambda part: part.n_groups)
     return {
         "against": clean[0].protocol,
-        "difference": with_interval(difference, resampled[0] - resampled[1], support),
+        "difference": with_interval(leaky_scores - clean_scores, support),
     }
 
 
@@ -137,7 +131,7 @@ def _has_healthy(task: Task, network: Judged) -> bool:
     """True if there are healthy test records."""
     if HEALTHY not in task.class_names:
         return False
-    return bool((network.label == task.class_names.index(HEALTHY)).any())
+    return bool((network.truth == task.class_names.index(HEALTHY)).any())
 
 
 def _window_length(
@@ -145,10 +139,9 @@ def _window_length(
 ) -> Entry:
     """Scores of the network by length of the signal judged."""
     rate = task.dataset.sampling_rate
-    windows = [run.windows for run in runs if run.windows is not None]
     return by_window_length(
-        _judged(task, runs[0].method, runs, runs[0].record),
-        [(part.record, part.log_probability) for part in windows],
+        judged_runs(task, runs),
+        [run.parts[WINDOWS] for run in runs if WINDOWS in run.parts],
         window_seconds=task.window_samples / rate,
         step_seconds=task.stride_samples / rate,
         n_bootstrap=settings.n_bootstrap,
@@ -156,15 +149,7 @@ def _window_length(
     )
 
 
-def _judged(
-    task: Task, method: str, runs: Sequence[Prediction], record: IntArray
-) -> Judged:
-    """A method on some of its test records."""
-    scores = [run.log_probability[np.searchsorted(run.record, record)] for run in runs]
-    return _of_records(task, method, record, np.stack(scores))
-
-
-def _held_back(task: Task, method: str, runs: Sequence[Prediction]) -> Judged | None:
+def _held_back(task: Task, runs: Sequence[Prediction]) -> Judged | None:
     """A method on healthy and reference records of validation machines; None without any."""
     rows = [run.held_back for run in runs if run.held_back is not None]
     if len(rows) < len(runs):
@@ -175,29 +160,10 @@ def _held_back(task: Task, method: str, runs: Sequence[Prediction]) -> Judged | 
     chosen = is_healthy[rows[0].record]
     if not chosen.any():
         return None
-    scores = np.stack([one.log_probability[chosen] for one in rows])
-    return _of_records(task, method, rows[0].record[chosen], scores, label=healthy)
-
-
-def _of_records(
-    task: Task,
-    method: str,
-    record: IntArray,
-    scores: FloatArray,
-    label: int | None = None,
-) -> Judged:
-    """A method on some records, all of one label where it is given."""
-    unit = np.unique(unit_ids(task)[record], return_inverse=True)[1]
-    labels = task.labels()[record]
-    if label is not None:
-        labels = np.full_like(record, label)
-    return Judged(
-        method=method,
-        label=labels,
-        unit=unit,
-        machines=machines_of(task.dataset, record),
-        log_probability=scores,
-    )
+    record = rows[0].record[chosen]
+    answers = np.stack([one.answers[chosen] for one in rows])
+    truth = np.full_like(record, healthy)
+    return judged_answers(task, runs[0].method, record, answers, truth)
 
 
 def _sizes(task: Task, record: IntArray) -> dict[str, dict[str, FloatArray]]:

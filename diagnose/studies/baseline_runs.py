@@ -9,10 +9,9 @@ import numpy as np
 
 from diagnose.baselines.base import Baseline, Input, Parts, Source, StorableBaseline
 from diagnose.baselines.estimators import record_scores
-from diagnose.baselines.features import FeatureTable
 from diagnose.baselines.registry import BASELINES
 from diagnose.data.windows import Task
-from diagnose.scoring.predictions import Prediction, Rows
+from diagnose.scoring.predictions import REFERENCES, VALIDATION, Prediction, Rows
 from diagnose.studies.canaries import canary_labels, counted, parts_with_canaries
 from diagnose.training.classes import shuffled_labels
 
@@ -107,15 +106,13 @@ def _prediction(baseline: Baseline, parts: Parts, source: Source) -> Prediction:
     record, scores = record_scores(baseline.predict_proba(judged), judged.record)
     tested = np.isin(record, parts.test.record)
 
-    def rows_of(table: FeatureTable | None) -> Rows | None:
-        """Scores of the records of a part beside the test; None without any."""
+    beside = {}
+    for name, table in ((VALIDATION, parts.validation), (REFERENCES, parts.references)):
         if table is None:
-            return None
+            continue
         mine = np.isin(record, table.record) & ~tested
-        if not mine.any():
-            return None
-        return Rows(record=record[mine], log_probability=scores[mine])
-
+        if mine.any():
+            beside[name] = Rows(record=record[mine], answers=scores[mine])
     weights = None
     if isinstance(baseline, StorableBaseline):
         weights = baseline.tensors()
@@ -124,9 +121,8 @@ def _prediction(baseline: Baseline, parts: Parts, source: Source) -> Prediction:
         method=baseline.text.name,
         seed=0,
         record=record[tested],
-        log_probability=scores[tested],
+        answers=scores[tested],
         detail=detail,
-        validation=rows_of(parts.validation),
-        references=rows_of(parts.references),
+        parts=beside,
         weights=weights,
     )

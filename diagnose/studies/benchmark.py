@@ -14,13 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.windows import Task, subset_segments, task_of
-from diagnose.scoring.judged import interval_text
+from diagnose.scoring.intervals import interval_text
+from diagnose.scoring.judged import class_scores, judged_runs
+from diagnose.scoring.predictions import Prediction
 from diagnose.studies.counts import n_different
-from diagnose.studies.protocol_results import is_leaky, score_predictions
+from diagnose.studies.protocol_results import is_leaky
 from diagnose.studies.result_files import Content, Entry, sha256
 from gensig.dataset.folder.layout import PLAN, SPLITS
 from gensig.errors import ConfigError, DatasetError
 from gensig.text.csv_tables import read_rows
+from gensig.text.markdown import table_lines
 from gensig.text.user_file import open_table
 
 if TYPE_CHECKING:
@@ -30,8 +33,6 @@ N_BOOTSTRAP = 2000
 REQUIRED = ("record_id", "predicted")
 RTOL = 1e-6  # between processors; the signals have 24 bits
 LARGEST_FILE = 200_000_000  # bytes
-
-Run = tuple[NDArray[np.integer], NDArray[np.integer]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,11 +127,11 @@ def score_file(dataset: Dataset, path: Path, *, protocol: str | None = None) -> 
     scores: dict[str, Entry] = {}
     chance: dict[str, float] = {}
     for (name, method), runs in _runs(task, path, protocol).items():
-        record = runs[0][0]
-        chance[name] = 1 / n_different(task.labels()[record])
+        judged = judged_runs(task, runs)
+        chance[name] = 1 / n_different(judged.truth)
         scores.setdefault(name, {})[method] = {
-            **score_predictions(task, runs, N_BOOTSTRAP),
-            "n_records": int(record.size),
+            **class_scores(judged, task.class_names, N_BOOTSTRAP),
+            "n_records": int(judged.truth.size),
             "n_seeds": len(runs),
         }
     return {
@@ -155,9 +156,10 @@ def _comparison(dataset: Dataset, protocols: Sequence[str]) -> Entry | None:
 
 def _runs(
     task: Task, path: Path, protocol: str | None
-) -> dict[tuple[str, str], list[Run]]:
-    """(protocol, method) -> for each seed the records of the test part, and their labels."""
-    runs: dict[tuple[str, str], list[Run]] = {}
+) -> dict[tuple[str, str], list[Prediction]]:
+    """(protocol, method) -> for each seed the predictions for the test part."""
+    runs: dict[tuple[str, str], list[Prediction]] = {}
+    one_hot = np.eye(len(task.class_names))
     for (name, method, seed), labels in _labels(task, path, protocol).items():
         if is_leaky(name):
             continue
@@ -170,8 +172,16 @@ def _runs(
                 f"records of {name} once; {len(missing)} are missing, "
                 f"{len(others)} are not of the test part"
             )
-        predicted = np.array([labels[record] for record in expected.tolist()])
-        runs.setdefault((name, method), []).append((expected, predicted))
+        predicted = [labels[record] for record in expected.tolist()]
+        run = Prediction(
+            protocol=name,
+            method=method,
+            seed=len(runs.get((name, method), [])),
+            record=expected,
+            answers=one_hot[predicted],
+            detail=seed,
+        )
+        runs.setdefault((name, method), []).append(run)
     if not runs:
         raise ConfigError(
             f"{path} holds predictions of leaky protocols only: those are no results"
@@ -234,7 +244,7 @@ def _rows(path: Path) -> list[dict[str, str]]:
 
 def score_table(result: Content) -> list[str]:
     """Markdown table: a row for each protocol and method, those of the benchmark marked."""
-    lines = ["| protocol | method | balanced accuracy | chance |", "|---|---|---|---|"]
+    cells = []
     shipped = (result["benchmark"] or {"results": {}})["results"]
     for protocol, methods in result["scores"].items():
         rows = {name: score["balanced_accuracy"] for name, score in methods.items()}
@@ -242,6 +252,5 @@ def score_table(result: Content) -> list[str]:
             rows[f"{name} (shipped)"] = score
         chance = f"{result['chance'][protocol]:.3f}"
         for name, score in rows.items():
-            text = interval_text(score, ".3f")
-            lines.append(f"| {protocol} | {name} | {text} | {chance} |")
-    return lines
+            cells.append((protocol, name, interval_text(score, ".3f"), chance))
+    return table_lines(("protocol", "method", "balanced accuracy", "chance"), cells)

@@ -19,6 +19,7 @@ from diagnose.data.window_input import Windows
 from diagnose.data.windows import (
     REFERENCES,
     SUBSETS,
+    FloatArray,
     Task,
     WindowSet,
     subset_segments,
@@ -28,7 +29,13 @@ from diagnose.networks.domain import fit_domain
 from diagnose.networks.network import Network
 from diagnose.networks.registry import input_of
 from diagnose.scoring.metrics import over_records
-from diagnose.scoring.predictions import Prediction, Rows
+from diagnose.scoring.predictions import (
+    LAST_EPOCH,
+    VALIDATION,
+    WINDOWS,
+    Prediction,
+    Rows,
+)
 from diagnose.settings import TrainSettings
 from diagnose.studies.baseline_runs import (
     LABEL_SHUFFLE,
@@ -37,12 +44,7 @@ from diagnose.studies.baseline_runs import (
 )
 from diagnose.studies.canaries import canary_labels, counted, with_canaries
 from diagnose.studies.jobs import Job, once
-from diagnose.studies.novelty import (
-    NoveltyRun,
-    fitted_runs,
-    rows_of_records,
-    trained_runs,
-)
+from diagnose.studies.novelty import fitted_runs, rows_of_records, trained_runs
 from diagnose.studies.result_files import network_name
 from diagnose.training.classes import Classes, predict_windows, with_shuffled_labels
 from diagnose.training.entries import predict_entries
@@ -55,24 +57,21 @@ from diagnose.training.train import Training, train_network
 PROBE, ORACLE, LEVEL_KEPT = "probe", "oracle", "level_kept"
 # The network that also sees a healthy record of the machine.
 WITH_REFERENCE = "with_reference"
-WINDOWS = Windows()
+OF_TIME = Windows()
 # Names of trained controls in metrics.json; that of `LEVEL_KEPT` is the same.
 ORACLE_NETWORK = "oracle_network"
 
 
-ClassOutcome = Prediction | NoveltyRun
-
-
-def run_job(task: Task, settings: TrainSettings, job: Job) -> list[ClassOutcome]:
+def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
     """Predictions, or scores of novelty, on the test part of each of the job's protocols.
 
     Those on the sham data set have names of their own.
     """
     first = job.protocols[0]
     if first in OPEN_PROTOCOLS:
-        return [*_novelty_runs(task, settings, first, job.seed)]
+        return _novelty_runs(task, settings, first, job.seed)
     if not job.sham:
-        return [*_predictions(task, settings, job)]
+        return _predictions(task, settings, job)
     folder, network = str(settings.sham), network_name(settings)
     sham = once("sham", folder, lambda: sham_task(task, folder))
     return [
@@ -91,12 +90,12 @@ def _predictions(task: Task, settings: TrainSettings, job: Job) -> list[Predicti
 
 def _novelty_runs(
     task: Task, settings: TrainSettings, protocol: str, seed: int | None
-) -> list[NoveltyRun]:
+) -> list[Prediction]:
     if seed is None:
         return fitted_runs(task, settings, protocol, _windows(task, protocol))
     inputs = input_of(settings.model)
     if protocol == HEALTHY_ONLY:
-        inputs = WINDOWS  # of the autoencoder
+        inputs = OF_TIME  # of the autoencoder
     return trained_runs(settings, protocol, seed, _windows(task, protocol, "", inputs))
 
 
@@ -115,7 +114,6 @@ def _run_training(
     train, validation, test = (
         with_canaries(sets[subset], canaries) for subset in SUBSETS
     )
-    method = _method(settings, job)
     if job.shuffled:
         settings = replace(settings, patience=0)
         rng = np.random.default_rng([seed, 2])
@@ -133,47 +131,47 @@ def _run_training(
         )
     model = training.model
     by_window = predict_windows(model, test)
-    record, scores = over_records(by_window, test.record)
+    record, answers = over_records(by_window, test.record)
+    parts = {
+        VALIDATION: rows_of_records(model, validation),
+        WINDOWS: Rows(record=test.record, answers=by_window),
+    }
+    further = {LAST_EPOCH: answers}
+    if not job.shuffled:
+        if REFERENCES in sets:
+            parts[REFERENCES] = rows_of_records(model, sets[REFERENCES])
+        further |= _further_answers(training, test)
     prediction = Prediction(
         protocol=protocol,
-        method=method,
+        method=_method(settings, job),
         seed=seed,
         record=record,
-        log_probability=scores,
+        answers=answers,
         detail=training.detail,
-        validation=rows_of_records(model, validation),
-        windows=Rows(record=test.record, log_probability=by_window),
+        parts=parts,
+        further=further,
         best_epoch=training.best_epoch,
         validation_loss=training.validation_loss,
         temperature=training.temperature,
-        last_predicted=scores.argmax(axis=1),
     )
     prediction = counted(prediction, canaries)
-    if job.shuffled:
-        return prediction
-    if REFERENCES in sets:
-        references = rows_of_records(model, sets[REFERENCES])
-        prediction = replace(prediction, references=references)
-    prediction = _with_further_answers(prediction, training, test)
-    if job.sham or control not in ("", WITH_REFERENCE):
+    if job.shuffled or job.sham or control not in ("", WITH_REFERENCE):
         return prediction
     key = (protocol, control)  # the same region for every seed
     domain = once("domain", key, lambda: fit_domain(train, validation))
     return replace(prediction, weights=training.weights(), domain=domain)
 
 
-def _with_further_answers(
-    prediction: Prediction, training: Training[Network], test: WindowSet
-) -> Prediction:
-    """The prediction with those of the last epoch, of further heads and of other entries."""
+def _further_answers(
+    training: Training[Network], test: WindowSet
+) -> dict[str, FloatArray]:
+    """Answers of the last epoch if it is not the best one, of further heads and other entries."""
+    further = predict_heads(training.model, test)
+    further |= predict_entries(training.model, test)
     if training.last_model is not None:
-        last = rows_of_records(training.last_model, test).log_probability
-        prediction = replace(prediction, last_predicted=last.argmax(axis=1))
-    return replace(
-        prediction,
-        heads=predict_heads(training.model, test),
-        entries=predict_entries(training.model, test),
-    )
+        last = rows_of_records(training.last_model, test)
+        further[LAST_EPOCH] = last.answers
+    return further
 
 
 def with_reference(settings: TrainSettings) -> TrainSettings:
@@ -214,7 +212,6 @@ def _run_baselines(task: Task, settings: TrainSettings, job: Job) -> list[Predic
             task=task,
             protocol=protocol,
             features=settings.features,
-            minirocket_features=settings.minirocket_features,
             windows=partial(_windows, task, protocol),
             caches=caches,
         )
@@ -236,7 +233,7 @@ def _windows(
     task: Task,
     protocol: str,
     control: str = "",
-    inputs: NetworkInput = WINDOWS,
+    inputs: NetworkInput = OF_TIME,
 ) -> dict[str, WindowSet]:
     """Windows of time, or the inputs that a network reads, of each subset."""
     load: Callable[..., WindowSet] = inputs.load

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar, final
+from typing import final
 
 import numpy as np
 
@@ -21,14 +20,12 @@ from diagnose.data.windows import (
     subset_segments,
     subsets_of,
 )
-from diagnose.networks.domain import Domain
-from diagnose.scoring.predictions import Prediction, Rows, write_predictions
+from diagnose.scoring.predictions import Prediction, by_method, write_predictions
 from diagnose.settings import TrainSettings
 from diagnose.studies.answers import leak_answer
 from diagnose.studies.baseline_runs import reasons_left_out
 from diagnose.studies.class_jobs import (
     WITH_REFERENCE,
-    ClassOutcome,
     run_job,
     with_reference,
 )
@@ -38,20 +35,16 @@ from diagnose.studies.controls import (
     sham_methods,
     without_sham,
 )
-from diagnose.studies.counts import by_method
 from diagnose.studies.jobs import Job, LearningStudy, Plan
-from diagnose.studies.novelty import NoveltyRun
 from diagnose.studies.novelty_metrics import (
     check_open_protocol,
     novelty_protocol_result,
     write_novelty,
 )
 from diagnose.studies.protocol_results import (
-    BOOTSTRAP_SEED,
     is_leaky,
     main_protocol,
     protocol_result,
-    score_predictions,
     test_score,
 )
 from diagnose.studies.result_files import Entry, network_name, save_network
@@ -64,10 +57,8 @@ from gensig.options.configuration import Section
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ClassStudy(LearningStudy[ClassOutcome]):
+class ClassStudy(LearningStudy):
     """Classes of records, and with open protocols their novelty; leaky protocols are last."""
-
-    kinds: ClassVar = (Prediction, Rows, Domain, NoveltyRun)
 
     @staticmethod
     def check(settings: TrainSettings) -> None:
@@ -101,20 +92,20 @@ class ClassStudy(LearningStudy[ClassOutcome]):
             baselines_left_out=reasons_left_out(task, closed, settings.baselines),
         )
 
-    def run_job(self, job: Job) -> list[ClassOutcome]:
+    def run_job(self, job: Job) -> list[Prediction]:
         """Predictions, or scores of novelty."""
         return run_job(self.task, self.settings, job)
 
-    def progress(self, runs: Sequence[ClassOutcome]) -> str:
+    def progress(self, runs: Sequence[Prediction]) -> str:
         """Line on a finished job: its training, or the names of its baselines."""
         last = runs[-1]
-        if isinstance(last, NoveltyRun) or last.best_epoch:
+        if last.best_epoch or last.protocol in OPEN_PROTOCOLS:
             return f"{last.protocol}, {last.method}, seed {last.seed}: {last.detail}"
         return ", ".join(dict.fromkeys(run.method for run in runs))
 
-    def save(self, folder: Path, run: ClassOutcome) -> None:
+    def save(self, folder: Path, run: Prediction) -> None:
         """Write a network or a baseline with its score; none of the sham data set."""
-        if isinstance(run, NoveltyRun) or is_sham(run.method):
+        if is_sham(run.method):
             return
         task, settings = self.task, self.settings
         score = test_score(task, run, settings.n_bootstrap)
@@ -127,24 +118,22 @@ class ClassStudy(LearningStudy[ClassOutcome]):
             settings = replace(settings, model=described)
         save_network(folder, name, task, settings, run, test_score=score)
 
-    def results(self, folder: Path, plan: Plan, runs: Sequence[ClassOutcome]) -> Entry:
+    def results(self, folder: Path, plan: Plan, runs: Sequence[Prediction]) -> Entry:
         """Write both tables of predictions, and return the results of all protocols."""
         task, settings = self.task, self.settings
-        predictions = [run for run in runs if isinstance(run, Prediction)]
-        novelty = [run for run in runs if isinstance(run, NoveltyRun)]
+        novelty = [run for run in runs if run.protocol in OPEN_PROTOCOLS]
+        predictions = [run for run in runs if run.protocol not in OPEN_PROTOCOLS]
         on_data = without_sham(predictions)
         write_predictions(folder / "predictions.csv", task, on_data)
         if novelty:
             write_novelty(folder / "novelty.csv", task, novelty)
-        n_bootstrap = settings.n_bootstrap
-        score = functools.partial(score_predictions, n_bootstrap=n_bootstrap)
-        shams = sham_methods(task, settings, predictions, score)
+        shams = sham_methods(task, settings, predictions)
         results: Entry = {}
         novelty_results: Entry = {}
         for name in plan.protocols:
             if name in OPEN_PROTOCOLS:
                 novelty_results[name] = novelty_protocol_result(
-                    task, name, novelty, n_bootstrap=n_bootstrap, seed=BOOTSTRAP_SEED
+                    task, name, novelty, n_bootstrap=settings.n_bootstrap
                 )
             else:
                 results[name] = protocol_result(

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -12,9 +11,11 @@ from diagnose.baselines.oracle import has_twin
 from diagnose.baselines.registry import baseline_names
 from diagnose.data.turns import NO_REFERENCE
 from diagnose.data.windows import CROSS_SENSOR, Task
-from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit
-from diagnose.scoring.predictions import Prediction
+from diagnose.scoring.judged import class_scores, judged_answers, judged_runs, score
+from diagnose.scoring.metrics import ACCURACY
+from diagnose.scoring.predictions import VALIDATION, Prediction, by_method, run_notes
 from diagnose.settings import BOTH, TrainSettings
+from diagnose.studies.baseline_runs import LABEL_SHUFFLE
 from diagnose.studies.class_jobs import (
     LEVEL_KEPT,
     ORACLE,
@@ -22,12 +23,9 @@ from diagnose.studies.class_jobs import (
     PROBE,
     WITH_REFERENCE,
 )
-from diagnose.studies.counts import by_method, run_notes
 from diagnose.studies.jobs import Job
 from diagnose.studies.result_files import Entry
 from diagnose.training import sham
-
-Pairs = Sequence[tuple[Any, Any]]
 
 
 def control_jobs(
@@ -112,9 +110,8 @@ def sham_methods(
     task: Task,
     settings: TrainSettings,
     predictions: Sequence[Prediction],
-    score: Callable[[Task, Pairs], Entry],
 ) -> dict[str, Entry]:
-    """Protocol -> method -> scores, by ``score``, of the trainings on the sham data set."""
+    """Protocol -> method -> scores of the trainings on the sham data set."""
     if settings.sham is None:
         return {}
     other = sham.sham_task(task, settings.sham)
@@ -123,8 +120,7 @@ def sham_methods(
     for protocol in dict.fromkeys(run.protocol for run in on_sham):
         results[protocol] = {}
         for method, runs in by_method(on_sham, protocol).items():
-            scores = score(other, [(run.record, run.predicted) for run in runs])
-            results[protocol][method] = {**scores, **run_notes(runs)}
+            results[protocol][method] = method_result(other, settings, runs)
     return results
 
 
@@ -142,15 +138,23 @@ def best_on_validation(
     A choice on the test records would flatter the chosen one.
     """
     among = set(methods)
-    labels, n_classes = task.labels(), len(task.class_names)
     scores: dict[str, list[float]] = {}
     for run in runs:
-        if run.method not in among or run.validation is None:
+        if run.method not in among or VALIDATION not in run.parts:
             continue
-        label = labels[run.validation.record]
-        predicted = run.validation.log_probability.argmax(axis=1)
-        confusion = confusion_by_unit(
-            label, predicted, np.zeros_like(label), n_classes
-        )[0]
-        scores.setdefault(run.method, []).append(float(balanced_accuracy(confusion)))
+        rows = run.parts[VALIDATION]
+        judged = judged_answers(task, run.method, rows.record, rows.answers[None])
+        scores.setdefault(run.method, []).append(score(judged, ACCURACY))
     return max(scores, key=lambda name: float(np.mean(scores[name])), default=None)
+
+
+def method_result(
+    task: Task, settings: TrainSettings, runs: Sequence[Prediction]
+) -> Entry:
+    """Entry of a method in ``metrics.json``."""
+    shuffled = runs[0].method.startswith(LABEL_SHUFFLE)
+    judged = judged_runs(task, runs)
+    scores = class_scores(
+        judged, task.class_names, settings.n_bootstrap, shuffled=shuffled
+    )
+    return {**scores, **run_notes(runs)}

@@ -1,9 +1,9 @@
-"""Records, units and runs of a protocol, as the results of a study count them."""
+"""Records and units of a protocol, as the results of a study count them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, TypeVar
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,6 @@ from diagnose.data.windows import (
     Task,
     subset_segments,
 )
-from diagnose.scoring.metrics import confusion_by_unit
-from diagnose.scoring.predictions import Outcome
-
-AnyRun = TypeVar("AnyRun", bound=Outcome)
 
 
 def unit_ids(task: Task) -> NDArray[Any]:
@@ -45,38 +41,3 @@ def part_sizes(task: Task, parts: Mapping[str, IntArray]) -> dict[str, dict[str,
 def n_different(values: NDArray[Any]) -> int:
     """Number of different values."""
     return int(np.unique(values).size)
-
-
-def by_method(runs: Sequence[AnyRun], protocol: str) -> dict[str, list[AnyRun]]:
-    """Method -> its runs on a protocol."""
-    result: dict[str, list[AnyRun]] = {}
-    for run in runs:
-        if run.protocol == protocol:
-            result.setdefault(run.method, []).append(run)
-    return result
-
-
-def run_notes(runs: Sequence[Outcome]) -> dict[str, list[Any]]:
-    """Seeds and details of the runs of a method."""
-    return {
-        "seeds": [run.seed for run in runs],
-        "detail": [run.detail for run in runs],
-    }
-
-
-def confusion_counts(
-    task: Task, runs: Sequence[tuple[IntArray, IntArray]]
-) -> NDArray[np.int64]:
-    """Counts (seed, unit, true class, predicted class).
-
-    Parameters
-    ----------
-    runs : for each seed, records (record,) and their predicted labels (record,)
-    """
-    labels, unit = task.labels(), unit_ids(task)
-    n_classes = len(task.class_names)
-    counts = [
-        confusion_by_unit(labels[record], predicted, unit[record], n_classes)
-        for record, predicted in runs
-    ]
-    return np.stack(counts)

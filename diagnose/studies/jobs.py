@@ -6,16 +6,15 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, TypeVar
 
 from diagnose.data.windows import Task
-from diagnose.scoring.predictions import Outcome
+from diagnose.scoring.predictions import Prediction
 from diagnose.settings import TrainSettings
 from diagnose.studies.kept_jobs import KeptJobs, keep_outcomes, kept_outcomes
 from diagnose.studies.result_files import Entry
 from diagnose.workers import call_all
 
-Run = TypeVar("Run", bound=Outcome)
 Made = TypeVar("Made")
 
 
@@ -52,17 +51,11 @@ class Plan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LearningStudy(ABC, Generic[Run]):
-    """Study of a learning target, for `diagnose.studies.study.run_study`.
-
-    Attributes
-    ----------
-    kinds : dataclasses that outcomes of jobs are made of
-    """
+class LearningStudy(ABC):
+    """Study of a learning target, for `diagnose.studies.study.run_study`."""
 
     task: Task
     settings: TrainSettings
-    kinds: ClassVar[tuple[type, ...]]
 
     @staticmethod
     @abstractmethod
@@ -85,30 +78,30 @@ class LearningStudy(ABC, Generic[Run]):
         """
 
     @abstractmethod
-    def run_job(self, job: Job) -> list[Run]:
+    def run_job(self, job: Job) -> list[Prediction]:
         """Outcomes on the test part of each of a job's protocols."""
 
     @abstractmethod
-    def progress(self, runs: Sequence[Run]) -> str:
+    def progress(self, runs: Sequence[Prediction]) -> str:
         """Line on a finished job."""
 
     @abstractmethod
-    def save(self, folder: Path, run: Run) -> None:
+    def save(self, folder: Path, run: Prediction) -> None:
         """Write the model of an outcome below a folder."""
 
     @abstractmethod
-    def results(self, folder: Path, plan: Plan, runs: Sequence[Run]) -> Entry:
+    def results(self, folder: Path, plan: Plan, runs: Sequence[Prediction]) -> Entry:
         """Write what was predicted into a folder, and return the scores of ``metrics.json``."""
 
 
 def run_jobs(
-    study: LearningStudy[Run],
+    study: LearningStudy,
     jobs: Sequence[Job],
     *,
     n_workers: int,
-    on_done: Callable[[list[Run]], None],
+    on_done: Callable[[list[Prediction]], None],
     kept: KeptJobs | None = None,
-) -> list[Run]:
+) -> list[Prediction]:
     """Outcomes of all jobs in the order of the jobs.
 
     Parameters
@@ -142,8 +135,8 @@ def run_jobs(
 
 
 def _run_and_keep(
-    study: LearningStudy[Run], kept: KeptJobs | None, job: Job
-) -> list[Run]:
+    study: LearningStudy, kept: KeptJobs | None, job: Job
+) -> list[Prediction]:
     outcomes = study.run_job(job)
     return outcomes if kept is None else keep_outcomes(kept, job, outcomes)
 

@@ -22,6 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.windows import SUBSETS, Task, subset_segments
+from diagnose.networks.domain import Domain
+from diagnose.scoring.hours import LifeFacts
+from diagnose.scoring.predictions import Prediction, Rows
 from diagnose.settings import TrainSettings
 from diagnose.studies.result_files import environment
 from diagnose.training.model_files import DIGEST, content_digest
@@ -40,6 +43,8 @@ from gensig.errors import DatasetError
 # settings that decide no outcome of a job, and the time of an environment
 WITHOUT = ("out", "n_threads", "data", "n_bootstrap")
 FINISHED = "finished"
+# dataclasses that outcomes of jobs are made of
+KINDS = {kind.__name__: kind for kind in (Prediction, Rows, Domain, LifeFacts)}
 LARGEST_TREE, LARGEST_ARRAYS = 2**26, 2**32  # bytes of the two files
 
 Arrays = list[NDArray[Any]]
@@ -53,12 +58,10 @@ class KeptJobs:
     ----------
     folder : exists
     digest : of everything that outcomes depend on, but the job; see `outcomes_digest`
-    kinds : dataclasses that outcomes are made of
     """
 
     folder: Path
     digest: str
-    kinds: tuple[type, ...]
 
     def name(self, job: Any) -> str:
         """Name of the files of a job: a digest of it and of everything it depends on."""
@@ -71,13 +74,11 @@ def kept_jobs(
     settings: TrainSettings,
     protocols: Sequence[str],
     folder: Path | None,
-    kinds: tuple[type, ...],
 ) -> KeptJobs | None:
     """The place for the outcomes of a study below a folder; None without one."""
     if folder is None:
         return None
-    digest = outcomes_digest(task, settings, protocols)
-    return KeptJobs(folder=folder, digest=digest, kinds=kinds)
+    return KeptJobs(folder=folder, digest=outcomes_digest(task, settings, protocols))
 
 
 def outcomes_digest(
@@ -118,7 +119,9 @@ def _segments_digest(task: Task, protocol: str, subset: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def keep_outcomes(kept: KeptJobs, job: Any, outcomes: Sequence[Any]) -> list[Any]:
+def keep_outcomes(
+    kept: KeptJobs, job: Any, outcomes: Sequence[Prediction]
+) -> list[Prediction]:
     """Write the outcomes of a job, and return them as they are read back.
 
     Raises
@@ -145,7 +148,7 @@ def keep_outcomes(kept: KeptJobs, job: Any, outcomes: Sequence[Any]) -> list[Any
     return found
 
 
-def kept_outcomes(kept: KeptJobs, job: Any) -> list[Any] | None:
+def kept_outcomes(kept: KeptJobs, job: Any) -> list[Prediction] | None:
     """Outcomes of a job; None where there are none that are whole and belong to this study."""
     path = kept.folder / kept.name(job)
     if not path.with_suffix(".json").is_file():
@@ -162,8 +165,7 @@ def kept_outcomes(kept: KeptJobs, job: Any) -> list[Any] | None:
             return None
         with np.load(io.BytesIO(raw), allow_pickle=False) as file:
             arrays = [file[f"arr_{index}"] for index in range(len(file.files))]
-        kinds = {kind.__name__: kind for kind in kept.kinds}
-        return [_decoded(each, arrays, kinds) for each in content["outcomes"]]
+        return [_decoded(each, arrays) for each in content["outcomes"]]
     except (
         DatasetError,
         OSError,
@@ -211,24 +213,23 @@ def _encoded(value: Any, arrays: Arrays) -> Any:
     raise TypeError(f"a {type(value).__name__} cannot be kept")
 
 
-def _decoded(tree: Any, arrays: Arrays, kinds: Mapping[str, type]) -> Any:
+def _decoded(tree: Any, arrays: Arrays) -> Any:
     """The value of a tree of `_encoded`."""
     if not isinstance(tree, dict):
         return tree
     if "kind" in tree:
         fields = {
-            name: _decoded(value, arrays, kinds)
-            for name, value in tree["fields"].items()
+            name: _decoded(value, arrays) for name, value in tree["fields"].items()
         }
-        return kinds[tree["kind"]](**fields)
+        return KINDS[tree["kind"]](**fields)
     ((form, value),) = tree.items()
     if form == "array":
         return arrays[value]
     if form == "number":
         return arrays[value][()]
     if form == "mapping":
-        return {key: _decoded(each, arrays, kinds) for key, each in value}
+        return {key: _decoded(each, arrays) for key, each in value}
     if form == "float":
         return float(value)
-    members = [_decoded(each, arrays, kinds) for each in value]
+    members = [_decoded(each, arrays) for each in value]
     return {"tuple": tuple, "list": list}[form](members)

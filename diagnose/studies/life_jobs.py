@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -35,36 +36,18 @@ from diagnose.data.windows import (
 )
 from diagnose.networks.domain import fit_domain
 from diagnose.networks.registry import input_of
+from diagnose.scoring.hours import AGE, LifeFacts
 from diagnose.scoring.life_scores import conformal_half_width
-from diagnose.scoring.predictions import Outcome
+from diagnose.scoring.predictions import Prediction
 from diagnose.settings import TrainSettings
 from diagnose.studies.counts import n_different
 from diagnose.studies.jobs import once
 from diagnose.studies.result_files import network_name
-from diagnose.training.life_facts import AGE, LifeFacts
 from diagnose.training.remaining_life import RemainingLife, shares_of_records
 from diagnose.training.train import train_network
 
 AGE_ONLY, CONSTANT, INDICATORS = "age_only", "constant", "indicators"
 AND_AGE = "_and_age"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LifePrediction(Outcome):
-    """Remaining lives of snapshots.
-
-    Attributes
-    ----------
-    predicted : (record,) h remaining life, cut at the early level
-    half_width : h, of the intervals; the early level where calibration lives are too few
-    early_life : h
-    facts : of networks only
-    """
-
-    predicted: FloatArray
-    half_width: float
-    early_life: float
-    facts: LifeFacts | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,8 +79,12 @@ class LifeSets:
         detail: str,
         answers: Iterable[tuple[IntArray, FloatArray]],
         seed: int = 0,
-    ) -> LifePrediction:
-        """Test snapshots with a method's answers: records, and their shares of the level."""
+        told: Mapping[str, FloatArray] = MappingProxyType({}),
+    ) -> Prediction:
+        """Test snapshots with a method's answers: records, and their shares of the level.
+
+        ``told`` are the columns that a network takes with the signal, of its training records.
+        """
         share = np.full(self.share.size, np.nan)
         for answered, shares in answers:
             share[answered] = shares
@@ -105,15 +92,25 @@ class LifeSets:
         life = self.lives.name[self.calibration]
         half_width = conformal_half_width(error, life, self.coverage)
         record = np.sort(self.parts["test"].record)
-        return LifePrediction(
+        return Prediction(
             protocol=self.protocol,
             method=method,
             seed=seed,
             record=record,
-            predicted=self.level * share[record],
-            half_width=min(half_width, self.level),
-            early_life=self.level,
+            answers=self.level * share[record][:, None],
             detail=detail,
+            hours=LifeFacts(
+                method=method,
+                early_life_h=self.level,
+                half_width_h=min(half_width, self.level),
+                coverage=self.coverage,
+                n_calibration_lives=n_different(life),
+                told=tuple(told),
+                told_range={
+                    name: (float(values.min()), float(values.max()))
+                    for name, values in told.items()
+                },
+            ),
         )
 
 
@@ -144,7 +141,7 @@ def life_sets(task: Task, settings: TrainSettings, protocol: str) -> LifeSets:
 
 def life_baselines(
     task: Task, settings: TrainSettings, sets: LifeSets
-) -> list[LifePrediction]:
+) -> list[Prediction]:
     """Predictions of the constant, the age alone and indicators."""
     lives, parts, share = sets.lives, sets.parts, sets.share
     train = parts["train"].record
@@ -180,7 +177,7 @@ def life_baselines(
 
 def life_networks(
     task: Task, settings: TrainSettings, sets: LifeSets, seed: int
-) -> list[LifePrediction]:
+) -> list[Prediction]:
     """Predictions of networks that are trained with a seed, without and with the age."""
     load, lives = input_of(settings.model).load, sets.lives
     windows = once(
@@ -218,32 +215,12 @@ def life_networks(
             shares_of_records(training.model, windows[subset], values)
             for subset in SUBSETS[1:]
         ]
-        prediction = sets.prediction(method, training.detail, answers, seed)
+        told = dict(zip(columns, values[seen].T, strict=True))
         prediction = replace(
-            prediction,
-            facts=_facts(sets, prediction, columns, values[seen]),
+            sets.prediction(method, training.detail, answers, seed, told),
             weights=training.weights(),
             domain=domain,
             best_epoch=training.best_epoch,
         )
         predictions.append(prediction)
     return predictions
-
-
-def _facts(
-    sets: LifeSets,
-    prediction: LifePrediction,
-    columns: tuple[str, ...],
-    values: FloatArray,
-) -> LifeFacts:
-    """Facts of a network whose training records have these values (record, column)."""
-    ends = zip(values.min(axis=0).tolist(), values.max(axis=0).tolist(), strict=True)
-    return LifeFacts(
-        method=prediction.method,
-        early_life_h=sets.level,
-        half_width_h=prediction.half_width,
-        coverage=sets.coverage,
-        n_calibration_lives=n_different(sets.lives.name[sets.calibration]),
-        told=columns,
-        told_range=dict(zip(columns, ends, strict=True)),
-    )

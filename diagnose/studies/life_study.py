@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import ClassVar, final
+from typing import Any, final
 
 import numpy as np
 
@@ -16,37 +15,23 @@ from diagnose.data.lives import (
     life_segments,
     lives_of,
 )
-from diagnose.data.windows import (
-    SUBSETS,
-    FloatArray,
-    IntArray,
-    Task,
-)
-from diagnose.networks.domain import Domain
-from diagnose.scoring.life_scores import (
-    UNITS,
-    Snapshots,
-    by_life,
-    gain,
-    interval,
-    intervals_hold,
-    life_scores,
-)
-from diagnose.scoring.machines import LIVES, Machines, machines_of
+from diagnose.data.windows import SUBSETS, IntArray, Task
+from diagnose.scoring.hours import interval, intervals_hold
+from diagnose.scoring.judged import BOOTSTRAP_SEED, Judged
+from diagnose.scoring.life_scores import UNITS, by_life, gain, life_scores
+from diagnose.scoring.machines import LIVES, machines_of
+from diagnose.scoring.predictions import Prediction, by_method, hours_of, run_notes
 from diagnose.settings import BOTH, TrainSettings
-from diagnose.studies.counts import by_method, n_different, run_notes
+from diagnose.studies.counts import n_different
 from diagnose.studies.jobs import Job, LearningStudy, Plan
 from diagnose.studies.life_jobs import (
     AGE_ONLY,
-    LifePrediction,
     life_baselines,
     life_networks,
     life_sets,
 )
-from diagnose.studies.protocol_results import BOOTSTRAP_SEED
 from diagnose.studies.result_files import Entry, save_network, write_rows
 from diagnose.studies.study import check_network
-from diagnose.training.life_facts import LifeFacts
 from gensig.errors import ConfigError
 
 REFUSED = ("heads", "sham", "test_channels", "tensorboard")  # settings
@@ -54,10 +39,8 @@ REFUSED = ("heads", "sham", "test_channels", "tensorboard")  # settings
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LifeStudy(LearningStudy[LifePrediction]):
+class LifeStudy(LearningStudy):
     """Hours of remaining life of machines that run to failure."""
-
-    kinds: ClassVar = (LifePrediction, LifeFacts, Domain)
 
     @staticmethod
     def check(settings: TrainSettings) -> None:
@@ -90,7 +73,7 @@ class LifeStudy(LearningStudy[LifePrediction]):
         ]
         return Plan(protocols=protocols, jobs=jobs, left_out=left_out)
 
-    def run_job(self, job: Job) -> list[LifePrediction]:
+    def run_job(self, job: Job) -> list[Prediction]:
         """Predictions of the baselines or, with a seed, of networks."""
         task, settings = self.task, self.settings
         sets = life_sets(task, settings, job.protocols[0])
@@ -98,19 +81,17 @@ class LifeStudy(LearningStudy[LifePrediction]):
             return life_baselines(task, settings, sets)
         return life_networks(task, settings, sets, job.seed)
 
-    def progress(self, runs: Sequence[LifePrediction]) -> str:
+    def progress(self, runs: Sequence[Prediction]) -> str:
         """Line on a finished job."""
         methods = ", ".join(run.method for run in runs)
         return f"{runs[-1].protocol}, {methods}, seed {runs[-1].seed}"
 
-    def save(self, folder: Path, run: LifePrediction) -> None:
+    def save(self, folder: Path, run: Prediction) -> None:
         """Write a network with the facts of its hours."""
         name, task = f"{run.protocol}-{run.method}", self.task
-        save_network(folder, name, task, self.settings, run, remaining_life=run.facts)
+        save_network(folder, name, task, self.settings, run)
 
-    def results(
-        self, folder: Path, plan: Plan, runs: Sequence[LifePrediction]
-    ) -> Entry:
+    def results(self, folder: Path, plan: Plan, runs: Sequence[Prediction]) -> Entry:
         """Write the predictions, and return the results of all protocols."""
         task, settings = self.task, self.settings
         lives = lives_of(task)
@@ -125,22 +106,18 @@ class LifeStudy(LearningStudy[LifePrediction]):
         }
 
 
-def measured(lives: Lives, runs: Sequence[LifePrediction]) -> dict[str, FloatArray]:
-    """Measure -> (run, life) values of the runs of a method, see `life_scores`."""
-    rows = [by_life(_scored_snapshots(lives, run)) for run in runs]
-    return {measure: np.stack([row[measure] for row in rows]) for measure in rows[0]}
-
-
-def _scored_snapshots(lives: Lives, prediction: LifePrediction) -> Snapshots:
-    """Snapshots of lives that failed; the remaining life of a censored one is not known."""
-    chosen = lives.failed[prediction.record]
-    record = prediction.record[chosen]
-    return Snapshots(
-        life=np.unique(lives.name[record], return_inverse=True)[1],
-        true=np.minimum(lives.remaining[record], prediction.early_life),
-        said=prediction.predicted[chosen],
-        half_width=prediction.half_width,
-        early_life=prediction.early_life,
+def judged_lives(task: Task, lives: Lives, runs: Sequence[Prediction]) -> Judged:
+    """Snapshots of lives that failed, each life a unit; of a censored one the rest is not known."""
+    chosen = lives.failed[runs[0].record]
+    record = runs[0].record[chosen]
+    life = lives.name[record]
+    level = hours_of(runs[0]).early_life_h
+    return Judged(
+        method=runs[0].method,
+        truth=np.minimum(lives.remaining[record], level),
+        unit=np.unique(life, return_inverse=True)[1],
+        machines=machines_of(task.dataset, record, unit=life, kind=LIVES),
+        answers=np.stack([run.answers[chosen] for run in runs]),
     )
 
 
@@ -149,30 +126,29 @@ def _result(
     settings: TrainSettings,
     lives: Lives,
     protocol: str,
-    predictions: Sequence[LifePrediction],
+    predictions: Sequence[Prediction],
 ) -> Entry:
     """Entry of a protocol in ``metrics.json``."""
     runs = by_method(predictions, protocol)
-    tables = {name: measured(lives, of_seeds) for name, of_seeds in runs.items()}
-    machines = machines_of_lives(task, lives, runs[AGE_ONLY][0].record)
+    judged = {name: judged_lives(task, lives, mine) for name, mine in runs.items()}
+    tables = {
+        name: by_life(judged[name], [hours_of(run) for run in mine])
+        for name, mine in runs.items()
+    }
+    machines = judged[AGE_ONLY].machines
     methods = {}
+
+    def resampling() -> dict[str, Any]:
+        rng = np.random.default_rng(BOOTSTRAP_SEED)
+        return {"machines": machines, "n_bootstrap": settings.n_bootstrap, "rng": rng}
+
     for name, of_seeds in runs.items():
-        score, better = (
-            partial(
-                function,
-                machines=machines,
-                n_bootstrap=settings.n_bootstrap,
-                rng=np.random.default_rng(BOOTSTRAP_SEED),
-            )
-            for function in (life_scores, gain)
-        )
+        errors = (tables[name]["rmse_h"], tables[AGE_ONLY]["rmse_h"])
         below = [below_bound(lives, run) for run in of_seeds]
         methods[name] = {
-            **score(tables[name]),
-            "gain_over_age_only_h": better(
-                tables[name]["rmse_h"], tables[AGE_ONLY]["rmse_h"]
-            ),
-            "half_width_h": [run.half_width for run in of_seeds],
+            **life_scores(tables[name], **resampling()),
+            "gain_over_age_only_h": gain(*errors, **resampling()),
+            "half_width_h": [hours_of(run).half_width_h for run in of_seeds],
             "censored_below_bound": float(np.mean(below)),
             **run_notes(of_seeds),
         }
@@ -180,7 +156,7 @@ def _result(
         subset: life_segments(task, lives, protocol, subset).record
         for subset in SUBSETS
     }
-    level = runs[AGE_ONLY][0].early_life
+    level = hours_of(runs[AGE_ONLY][0]).early_life_h
     n_lives, n_censored = (
         {
             subset: count_lives(lives, record, failed=failed)
@@ -206,13 +182,7 @@ def _result(
     }
 
 
-def machines_of_lives(task: Task, lives: Lives, record: IntArray) -> Machines:
-    """Machines of the lives of some records that failed; each life is a unit."""
-    scored = record[lives.failed[record]]
-    return machines_of(task.dataset, scored, unit=lives.name[scored], kind=LIVES)
-
-
-def below_bound(lives: Lives, prediction: LifePrediction) -> float:
+def below_bound(lives: Lives, prediction: Prediction) -> float:
     """Share of the censored test snapshots predicted below their known remaining life.
 
     0 where there are none.
@@ -221,8 +191,8 @@ def below_bound(lives: Lives, prediction: LifePrediction) -> float:
     known = lives.remaining[prediction.record[censored]]
     if not known.size:
         return 0.0
-    bound = np.minimum(known, prediction.early_life)
-    return float(np.mean(prediction.predicted[censored] < bound))
+    bound = np.minimum(known, hours_of(prediction).early_life_h)
+    return float(np.mean(prediction.answers[censored, 0] < bound))
 
 
 def count_lives(lives: Lives, record: IntArray, *, failed: bool) -> int:
@@ -234,7 +204,7 @@ def write_life_predictions(
     path: Path,
     task: Task,
     lives: Lives,
-    predictions: Sequence[LifePrediction],
+    predictions: Sequence[Prediction],
 ) -> None:
     """Write one row a prediction.
 
@@ -243,9 +213,10 @@ def write_life_predictions(
     write_rows(path, (row for run in predictions for row in _rows(task, lives, run)))
 
 
-def _rows(task: Task, lives: Lives, run: LifePrediction) -> Iterator[Entry]:
+def _rows(task: Task, lives: Lives, run: Prediction) -> Iterator[Entry]:
     ids = np.asarray(task.dataset.column("record_id"))
-    low, high = interval(run.predicted, run.half_width, run.early_life)
+    said, hours = run.answers[:, 0], hours_of(run)
+    low, high = interval(said, hours.half_width_h, hours.early_life_h)
     for row, record in enumerate(run.record.tolist()):
         failed = int(lives.failed[record])
         yield {
@@ -257,8 +228,8 @@ def _rows(task: Task, lives: Lives, run: LifePrediction) -> Iterator[Entry]:
             "life_time_h": f"{lives.age[record]:.6g}",
             "remaining_life_h": f"{lives.remaining[record]:.6g}",
             "life_failed": failed,
-            "early_life_h": f"{run.early_life:.6g}",
-            "predicted_h": f"{run.predicted[row]:.6g}",
+            "early_life_h": f"{hours.early_life_h:.6g}",
+            "predicted_h": f"{said[row]:.6g}",
             "low_h": f"{low[row]:.6g}",
             "high_h": f"{high[row]:.6g}",
             "scored": failed,

@@ -7,7 +7,7 @@ trains on all classes but one and asks if a network that tells them apart notice
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -32,7 +32,7 @@ from diagnose.networks.domain import (
     neighbor_distance,
 )
 from diagnose.scoring.metrics import over_records
-from diagnose.scoring.predictions import Outcome, Rows
+from diagnose.scoring.predictions import KNOWN_CLASSES, VALIDATION, Prediction, Rows
 from diagnose.settings import TrainSettings
 from diagnose.training.autoencoder import fit_autoencoder, reconstruction_error
 from diagnose.training.classes import Classes, predict_windows
@@ -53,22 +53,6 @@ SCORE_LABELS = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NoveltyRun(Outcome):
-    """Scores of novelty of the test records of a protocol, by one method and seed.
-
-    Attributes
-    ----------
-    score : (record,) of the test part
-    validation_score : (record,) of the validation part, whose classes are those of the training
-    predicted : (record,) labels of a network that tells known classes apart; None of other methods
-    """
-
-    score: FloatArray
-    validation_score: FloatArray
-    predicted: IntArray | None = None
-
-
 def _run(
     protocol: str,
     method: str,
@@ -77,34 +61,35 @@ def _run(
     rows: Mapping[str, WindowSet] | Mapping[str, FeatureTable] | Mapping[str, Rows],
     *,
     seed: int = 0,
-    predicted: IntArray | None = None,
-) -> NoveltyRun:
-    """Run of a method.
+    known: FloatArray | None = None,
+) -> Prediction:
+    """Scores of novelty of the test and the validation records, whose classes were trained on.
 
     Parameters
     ----------
     score_of : (row,) scores of a subset
     rows : subset -> windows, stretches or records; scores are averaged over each record
+    known : (record, class) of a network that tells known classes apart
     """
-    (record, score), (_, validation) = (
+    (record, answers), (others, scores) = (
         over_records(score_of(subset)[:, None], rows[subset].record)
-        for subset in ("test", "validation")
+        for subset in ("test", VALIDATION)
     )
-    return NoveltyRun(
+    return Prediction(
         protocol=protocol,
         method=method,
         seed=seed,
         detail=detail,
         record=record,
-        score=score[:, 0],
-        validation_score=validation[:, 0],
-        predicted=predicted,
+        answers=answers,
+        parts={VALIDATION: Rows(record=others, answers=scores)},
+        further={} if known is None else {KNOWN_CLASSES: known},
     )
 
 
 def fitted_runs(
     task: Task, settings: TrainSettings, protocol: str, sets: Mapping[str, WindowSet]
-) -> list[NoveltyRun]:
+) -> list[Prediction]:
     """Scores that are fitted: distances of band levels, and for `healthy_only` of indicators.
 
     Parameters
@@ -143,7 +128,7 @@ def _indicator_runs(
     tables: Mapping[str, FeatureTable],
     suffix: str,
     chosen: NDArray[np.bool_],
-) -> list[NoveltyRun]:
+) -> list[Prediction]:
     """Distance to the fifth nearest training record, and an isolation forest.
 
     Both on the chosen indicators, standardised.
@@ -178,7 +163,7 @@ def _indicator_runs(
 
 def trained_runs(
     settings: TrainSettings, protocol: str, seed: int, sets: Mapping[str, WindowSet]
-) -> list[NoveltyRun]:
+) -> list[Prediction]:
     """Scores of a network trained on the known classes.
 
     An autoencoder of healthy windows, else a classifier.
@@ -202,7 +187,7 @@ def trained_runs(
 
 def _classifier_runs(
     settings: TrainSettings, protocol: str, seed: int, sets: Mapping[str, WindowSet]
-) -> list[NoveltyRun]:
+) -> list[Prediction]:
     """Three scores of one classifier of the known classes.
 
     The largest probability is that of a record's calibrated class probabilities. Energy and
@@ -232,14 +217,16 @@ def _classifier_runs(
     trained, _ = network_outputs(model, sets["train"], np.unique(rows))
     outputs = {
         subset: network_outputs(model, sets[subset], np.arange(len(sets[subset])))
-        for subset in ("validation", "test")
+        for subset in (VALIDATION, "test")
     }
     records = {subset: rows_of_records(model, sets[subset]) for subset in outputs}
-    predicted = classes[records["test"].log_probability.argmax(axis=1)]
+    known_classes = np.full((records["test"].record.size, classes.max() + 1), -np.inf)
+    known_classes[:, classes] = records["test"].answers
 
     def doubt(subset: str) -> FloatArray:
-        scores = records[subset].log_probability
-        return 1 - probabilities(scores, training.temperature).max(axis=1)
+        return 1 - probabilities(records[subset].answers, training.temperature).max(
+            axis=1
+        )
 
     def energy(subset: str) -> FloatArray:
         return -np.logaddexp.reduce(outputs[subset][1], axis=1)
@@ -249,7 +236,7 @@ def _classifier_runs(
         return neighbor_distance(features, _unit_length(trained))
 
     make = partial(
-        _run, protocol, detail=training.detail, seed=seed, predicted=predicted
+        _run, protocol, detail=training.detail, seed=seed, known=known_classes
     )
     return [
         make("largest_probability", score_of=doubt, rows=records),
@@ -261,7 +248,7 @@ def _classifier_runs(
 def rows_of_records(model: nn.Module, windows: WindowSet) -> Rows:
     """Log-probabilities of the records of a set, means over their windows."""
     record, scores = over_records(predict_windows(model, windows), windows.record)
-    return Rows(record=record, log_probability=scores)
+    return Rows(record=record, answers=scores)
 
 
 def network_outputs(

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from functools import partial
 from types import MappingProxyType
 
 import numpy as np
@@ -13,37 +11,21 @@ from numpy.typing import NDArray
 from diagnose.data.protocols import NEW_MACHINE
 from diagnose.data.windows import Task
 from diagnose.networks.calibration import calibration_scores
+from diagnose.scoring.judged import BOOTSTRAP_SEED, class_scores, judged_runs
 from diagnose.scoring.machines import machines_of
-from diagnose.scoring.metrics import (
-    SCORES,
-    ratio_with_interval,
-    recall,
-    score_with_interval,
-)
-from diagnose.scoring.predictions import Prediction
+from diagnose.scoring.metrics import ACCURACY, SCORES, ratio_with_interval
+from diagnose.scoring.predictions import LAST_EPOCH, Prediction, by_method
 from diagnose.settings import TrainSettings
 from diagnose.studies.answers import protocol_answers
-from diagnose.studies.baseline_runs import LABEL_SHUFFLE
 from diagnose.studies.class_jobs import ORACLE
-from diagnose.studies.controls import chosen_oracle
-from diagnose.studies.counts import (
-    by_method,
-    confusion_counts,
-    n_different,
-    part_records,
-    part_sizes,
-    run_notes,
-    unit_ids,
-)
+from diagnose.studies.controls import chosen_oracle, method_result
+from diagnose.studies.counts import n_different, part_records, part_sizes, unit_ids
 from diagnose.studies.result_files import Content, Entry, network_name
 from diagnose.studies.verdicts import control_verdicts
 from diagnose.training.entries import entry_scores
 from diagnose.training.heads import head_scores
 
-BOOTSTRAP_SEED = 20240607
 FAULT_GEAR = "fault_gear"  # column; "" for healthy records
-ACCURACY = "balanced_accuracy"
-Pairs = Sequence[tuple[NDArray[np.integer], NDArray[np.integer]]]
 
 
 def is_leaky(protocol: str) -> bool:
@@ -67,51 +49,15 @@ def main_protocol(results: Mapping[str, Entry]) -> str | None:
     return next(iter(clean), None)
 
 
-def score_predictions(
-    task: Task, runs: Pairs, n_bootstrap: int, *, shuffled: bool = False
-) -> Entry:
-    """Scores of one method with intervals over machines, confusion counts and recall.
-
-    Parameters
-    ----------
-    task : gives labels and machines
-    runs : for each seed, records (record,) and predicted labels (record,); the same records in each
-    n_bootstrap : resamples of the machines
-    shuffled : see `diagnose.scoring.metrics.score_with_interval`
-    """
-    confusion = confusion_counts(task, runs)
-    machines = machines_of(task.dataset, runs[0][0])
-    rng = np.random.default_rng(BOOTSTRAP_SEED)
-    result: Entry = {}
-    for name in SCORES:
-        score = score_with_interval(
-            name,
-            confusion,
-            n_bootstrap=n_bootstrap,
-            rng=rng,
-            machines=machines,
-            shuffled=shuffled,
-        )
-        result[name] = asdict(score)
-    total = confusion.sum(axis=(0, 1))
-    shares = zip(task.class_names, recall(total).tolist(), strict=True)
-    result["confusion"] = total.tolist()
-    result["recall"] = {name: share for name, share in shares if np.isfinite(share)}
-    return result
-
-
 def test_score(task: Task, prediction: Prediction, n_bootstrap: int) -> Entry:
     """Score that is stored with a network.
 
     Balanced accuracy with its interval, chance, and the numbers of records and units.
     """
-    record = prediction.record
-    scores = score_predictions(task, [(record, prediction.predicted)], n_bootstrap)
-    accuracy = scores["balanced_accuracy"]
+    record, judged = prediction.record, judged_runs(task, [prediction])
+    accuracy = class_scores(judged, task.class_names, n_bootstrap)[ACCURACY]
     return {
-        "balanced_accuracy": {
-            key: accuracy[key] for key in ("mean", "low", "high", "too_few")
-        },
+        ACCURACY: {key: accuracy[key] for key in ("mean", "low", "high", "too_few")},
         "chance": 1.0 / n_different(task.labels()[record]),
         "n_records": int(record.size),
         "n_units": n_different(unit_ids(task)[record]),
@@ -135,9 +81,7 @@ def protocol_result(
     shams : scores of the trainings on the sham data set
     """
     runs = by_method(predictions, protocol)
-    methods = {
-        name: _method_result(task, settings, name, mine) for name, mine in runs.items()
-    }
+    methods = {name: method_result(task, settings, mine) for name, mine in runs.items()}
     network = runs[network_name(settings)]
     methods["chance"] = _chance(task, network[0].record)
     mine = [run for of_method in runs.values() for run in of_method]
@@ -174,7 +118,7 @@ def protocol_result(
         "heads": head_scores(
             task, parts["train"], network, n_bootstrap=settings.n_bootstrap
         ),
-        "entry": _entry(task, settings, network),
+        "entry": entry_scores(task, network, n_bootstrap=settings.n_bootstrap),
         "by_gear": _by_gear(task, settings, network),
         "answers": answers,
     }
@@ -183,13 +127,6 @@ def protocol_result(
 def _holds(controls: Content, method: str) -> bool:
     """False for a method with a control that failed."""
     return method not in controls or bool(controls[method]["holds"])
-
-
-def _entry(task: Task, settings: TrainSettings, network: Sequence[Prediction]) -> Entry:
-    """Scores of `diagnose.training.entries.entry_scores`."""
-    return entry_scores(
-        network, partial(score_predictions, task, n_bootstrap=settings.n_bootstrap)
-    )
 
 
 def _by_gear(
@@ -207,19 +144,11 @@ def _by_gear(
         return {}
     scores = {}
     for name in named:
-        judged = np.isin(gear, ["", name])
-        pairs = [(run.record[judged], run.predicted[judged]) for run in network]
-        scores[name] = score_predictions(task, pairs, settings.n_bootstrap)[ACCURACY]
+        chosen = network[0].record[np.isin(gear, ["", name])]
+        judged = judged_runs(task, network, chosen)
+        of_gear = class_scores(judged, task.class_names, settings.n_bootstrap)
+        scores[name] = of_gear[ACCURACY]
     return scores
-
-
-def _method_result(
-    task: Task, settings: TrainSettings, method: str, runs: Sequence[Prediction]
-) -> Entry:
-    pairs = [(run.record, run.predicted) for run in runs]
-    shuffled = method.startswith(LABEL_SHUFFLE)
-    scores = score_predictions(task, pairs, settings.n_bootstrap, shuffled=shuffled)
-    return {**scores, **run_notes(runs)}
 
 
 def _chance(task: Task, tested: NDArray[np.integer]) -> dict[str, float]:
@@ -239,34 +168,26 @@ def _over_oracle(
     oracle: Sequence[Prediction],
 ) -> Entry:
     """Scores of the network as shares of the oracle's."""
-    above, below = (
-        confusion_counts(task, [(run.record, run.predicted) for run in runs])
-        for runs in (network, oracle)
-    )
-    machines = machines_of(task.dataset, network[0].record)
-    ratios = {}
-    for name in SCORES:
-        ratios[name] = ratio_with_interval(
+    above, below = (judged_runs(task, runs) for runs in (network, oracle))
+    return {
+        name: ratio_with_interval(
             name,
-            above,
-            below,
+            above.confusion(),
+            below.confusion(),
             n_bootstrap=settings.n_bootstrap,
             rng=np.random.default_rng(BOOTSTRAP_SEED),
-            machines=machines,
+            machines=above.machines,
         )
-    return ratios
+        for name in SCORES
+    }
 
 
 def _last_epoch(
     task: Task, settings: TrainSettings, network: Sequence[Prediction]
 ) -> Entry:
     """Epochs run, and scores of the weights of the last one, for comparison with the best."""
-    pairs = [
-        (run.record, run.last_predicted)
-        for run in network
-        if run.last_predicted is not None
-    ]
-    scores = score_predictions(task, pairs, settings.n_bootstrap)
+    judged = judged_runs(task, network, further=LAST_EPOCH)
+    scores = class_scores(judged, task.class_names, settings.n_bootstrap)
     return {
         "epoch": [len(run.validation_loss) for run in network],
         **{name: scores[name] for name in SCORES},
@@ -277,7 +198,7 @@ def _calibration(task: Task, network: Sequence[Prediction]) -> Entry:
     """Calibration of the probabilities of test records."""
     labels = task.labels()
     return calibration_scores(
-        [run.log_probability for run in network],
+        [run.answers for run in network],
         [labels[run.record] for run in network],
         [run.temperature for run in network],
     )

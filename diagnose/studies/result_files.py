@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from diagnose.data.windows import Task
-from diagnose.scoring.predictions import Outcome
+from diagnose.scoring.predictions import Prediction
 from diagnose.settings import TrainSettings
 from diagnose.training.store import (
     data_fingerprint,
@@ -88,7 +88,7 @@ def save_network(
     name: str,
     task: Task,
     settings: TrainSettings,
-    run: Outcome,
+    run: Prediction,
     **facts: Any,
 ) -> None:
     """Write a network into ``models/<name>-seed<k>`` below a folder.

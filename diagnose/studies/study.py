@@ -18,8 +18,9 @@ from diagnose.networks.registry import (
     has_window_length,
     input_of,
 )
+from diagnose.scoring.predictions import Prediction
 from diagnose.settings import BOTH, TrainSettings
-from diagnose.studies.jobs import LearningStudy, Plan, Run, run_jobs
+from diagnose.studies.jobs import LearningStudy, Plan, run_jobs
 from diagnose.studies.kept_jobs import kept_jobs
 from diagnose.studies.result_files import Entry, network_name, study_facts
 from diagnose.training.train import device_of
@@ -87,12 +88,12 @@ def check_network(
 
 
 def run_study(
-    study: LearningStudy[Run],
+    study: LearningStudy,
     plan: Plan,
     *,
     kept_in: Path | None = None,
     on_done: Callable[[str], None] = lambda line: None,
-) -> tuple[Entry, list[Run]]:
+) -> tuple[Entry, list[Prediction]]:
     """Run the jobs, write their models, and return the content of ``metrics.json`` and outcomes.
 
     Parameters
@@ -107,7 +108,7 @@ def run_study(
         plan.jobs,
         n_workers=read_n_workers(settings.n_threads),
         on_done=lambda done: on_done(study.progress(done)),
-        kept=kept_jobs(task, settings, plan.protocols, kept_in, study.kinds),
+        kept=kept_jobs(task, settings, plan.protocols, kept_in),
     )
     folder = Path(settings.out)
     for run in runs:

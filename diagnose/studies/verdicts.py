@@ -7,7 +7,7 @@ from typing import Any
 
 from diagnose.baselines.base import Role
 from diagnose.baselines.registry import baseline_names
-from diagnose.scoring.metrics import is_above
+from diagnose.scoring.intervals import is_above
 from diagnose.scoring.predictions import Prediction
 from diagnose.studies.baseline_runs import LABEL_SHUFFLE, shuffle_method
 from diagnose.studies.class_jobs import LEVEL_KEPT, WITH_REFERENCE
@@ -90,7 +90,7 @@ def _canaries(runs: Sequence[Prediction]) -> dict[str, Any] | None:
     from scipy.stats import binom
 
     counts = [
-        (run.n_followed, run.record.size, run.log_probability.shape[1])
+        (run.n_followed, run.record.size, run.answers.shape[1])
         for run in runs
         if run.n_followed is not None
     ]

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from diagnose.scoring.hours import LIFE_COLUMNS, LifeFacts
+
 Reader = Callable[[str, Any], Any]  # name and value -> typed value, or ValueError
 
 MOST_CHANNELS, MOST_CLASSES, MOST_TEETH = 256, 1000, 5000
@@ -17,8 +19,6 @@ MOST_BLOCKS = 64  # entries of a list of a network
 MOST_HOURS = 1e9
 LONGEST_TEXT = 500
 NORMALISATIONS = ("rms", "none")
-# columns that a network of remaining lives may take beside the signal
-LIFE_COLUMNS = ("speed_rpm", "torque_nm", "life_time_h")
 SCHEDULE = "training"  # of a network's parameters; builds nothing
 
 
@@ -183,31 +183,6 @@ REQUIRED: Mapping[str, Reader] = {
     "best_epoch": whole(0, 10**9),
     "n_bootstrap": whole(1, 10**6),
 }
-# Values that older models lack, and some that are null.
-OPTIONAL: Mapping[str, Reader] = {
-    "speed_rpm_range": pair(number(0.0, 1e9), ordered=True),
-    "out_of_distribution": mapping,
-    "n_teeth": pair(_tooth_count),
-    "n_teeth_range": pair(pair(_tooth_count, ordered=True)),
-    "temperature": number(1e-3, 1e3),
-    "test_channel_names": texts(MOST_CHANNELS),
-    "adaptation": mapping,
-    "test_score": group(
-        {
-            "balanced_accuracy": group(
-                {
-                    "mean": _score,
-                    "low": _score,
-                    "high": _score,
-                }
-            ),
-            "chance": number(0.0, 1.0),
-            "n_records": whole(0, 10**12),
-            "n_units": whole(0, 10**12),
-            "leaky": flag,
-        }
-    ),
-}
 LIFE_RANGE = pair(number(-1e12, 1e12), ordered=True)
 
 
@@ -227,3 +202,36 @@ LIFE: Reader = group(
         "told_range": _life_ranges,
     }
 )
+
+
+def life_facts(name: str, value: Any) -> LifeFacts:
+    """Facts of the content of ``model.json``."""
+    return LifeFacts(**LIFE(name, value))
+
+
+# Values that older models lack, and some that are null.
+OPTIONAL: Mapping[str, Reader] = {
+    "speed_rpm_range": pair(number(0.0, 1e9), ordered=True),
+    "out_of_distribution": mapping,
+    "n_teeth": pair(_tooth_count),
+    "n_teeth_range": pair(pair(_tooth_count, ordered=True)),
+    "temperature": number(1e-3, 1e3),
+    "test_channel_names": texts(MOST_CHANNELS),
+    "adaptation": mapping,
+    "remaining_life": life_facts,
+    "test_score": group(
+        {
+            "balanced_accuracy": group(
+                {
+                    "mean": _score,
+                    "low": _score,
+                    "high": _score,
+                }
+            ),
+            "chance": number(0.0, 1.0),
+            "n_records": whole(0, 10**12),
+            "n_units": whole(0, 10**12),
+            "leaky": flag,
+        }
+    ),
+}

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
 from torch.nn.functional import log_softmax
 
-from diagnose.data.windows import FloatArray, WindowSet
+from diagnose.data.windows import FloatArray, Task, WindowSet
 from diagnose.networks.network import Network, SiteNetwork
 from diagnose.networks.tooth_entry import sample_of
-from diagnose.scoring.judged import interval_text
-from diagnose.scoring.metrics import over_records
-
-if TYPE_CHECKING:
-    from diagnose.scoring.predictions import Prediction
+from diagnose.scoring.intervals import interval_text
+from diagnose.scoring.judged import class_scores, judged_runs
+from diagnose.scoring.metrics import ACCURACY, over_records
+from diagnose.scoring.predictions import Prediction
 
 KNOWN, UNKNOWN, ERROR = "known", "unknown", "median_error"
 
@@ -55,23 +54,23 @@ def predict_entries(
     return answers | {ERROR: np.median(np.concatenate(errors))}
 
 
-def entry_scores(runs: Sequence[Prediction], judge: Any) -> dict[str, Any]:
+def entry_scores(
+    task: Task, runs: Sequence[Prediction], *, n_bootstrap: int
+) -> dict[str, Any]:
     """Scores of `predict_entries` for ``metrics.json``; empty where a run has none.
 
     Parameters
     ----------
+    task : gives classes and machines
     runs : one a seed, of one protocol
-    judge : function of records and predicted labels of every run, which returns their scores
     """
-    if not all(run.entries for run in runs):
+    if not all(KNOWN in run.further for run in runs):
         return {}
-    scores = {
-        name: judge([(run.record, run.entries[name].argmax(axis=1)) for run in runs])[
-            "balanced_accuracy"
-        ]
-        for name in (KNOWN, UNKNOWN)
-    }
-    errors = [float(run.entries[ERROR]) for run in runs]
+    scores: dict[str, Any] = {}
+    for name in (KNOWN, UNKNOWN):
+        judged = judged_runs(task, runs, further=name)
+        scores[name] = class_scores(judged, task.class_names, n_bootstrap)[ACCURACY]
+    errors = [float(run.further[ERROR]) for run in runs]
     return scores | {ERROR: float(np.mean(errors))}
 
 

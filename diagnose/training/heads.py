@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
@@ -14,17 +13,15 @@ from diagnose.data.packed_turns import tooth_counts
 from diagnose.data.targets import GEARS, record_targets
 from diagnose.data.windows import FloatArray, IntArray, Task, WindowSet
 from diagnose.networks.network import Network, SiteNetwork
-from diagnose.scoring.judged import interval_text
-from diagnose.scoring.machines import machines_of
+from diagnose.scoring.intervals import interval_text, with_interval
+from diagnose.scoring.judged import Judged, judged_runs
 from diagnose.scoring.metrics import (
-    confusion_by_unit,
+    ACCURACY,
     over_records,
+    ratio,
     score_with_interval,
-    spread_of,
 )
-
-if TYPE_CHECKING:
-    from diagnose.scoring.predictions import Prediction
+from diagnose.scoring.predictions import Prediction
 
 BOOTSTRAP_SEED = 20240608
 
@@ -100,39 +97,38 @@ def head_scores(
     record = runs[0].record
     truth = record_targets(task.dataset, record)
     known = record_targets(task.dataset, trained_on)
-    unit = np.asarray(task.dataset.column("unit_id"))[record]
     scores: dict[str, Any] = {}
-    if "severity" in truth and all("severity" in run.heads for run in runs):
+    if "severity" in truth and all("severity" in run.further for run in runs):
         labels = task.labels()
-        label, every = labels[record], np.arange(record.size)
-        predicted = np.stack([run.heads["severity"][every, label] for run in runs])
         scores["severity_mae"] = {}
         for index, name in enumerate(task.class_names):
-            chosen = (label == index) & ~np.isnan(truth["severity"])
+            chosen = (labels[record] == index) & ~np.isnan(truth["severity"])
             if chosen.any():
+                in_training = known["severity"][labels[trained_on] == index]
                 scores["severity_mae"][name] = _severity_error(
-                    task,
-                    record[chosen],
-                    predicted[:, chosen],
-                    truth["severity"][chosen],
-                    known["severity"][labels[trained_on] == index],
+                    judged_runs(
+                        task,
+                        runs,
+                        record[chosen],
+                        further="severity",
+                        truth=truth["severity"][chosen],
+                    ),
+                    index,
+                    in_training,
                     n_bootstrap=n_bootstrap,
                     rng=rng,
                 )
-    if "gear" in truth and all("gear" in run.heads for run in runs):
-        gears = [run.heads["gear"].argmax(axis=1) for run in runs]
-        counts = [
-            confusion_by_unit(truth["gear"], gear, unit, len(GEARS)) for gear in gears
-        ]
+    if "gear" in truth and all("gear" in run.further for run in runs):
+        judged = judged_runs(task, runs, further="gear", truth=truth["gear"])
         score = score_with_interval(
-            "balanced_accuracy",
-            np.stack(counts),
+            ACCURACY,
+            judged.confusion(),
             n_bootstrap=n_bootstrap,
             rng=rng,
-            machines=machines_of(task.dataset, record),
+            machines=judged.machines,
         )
         scores["faulted_gear"] = {
-            "balanced_accuracy": asdict(score),
+            ACCURACY: score,
             "chance": 1.0 / np.unique(truth["gear"]).size,
             "gears": list(GEARS),
         }
@@ -140,36 +136,29 @@ def head_scores(
 
 
 def _severity_error(
-    task: Task,
-    record: IntArray,
-    predicted: FloatArray,
-    truth: FloatArray,
+    judged: Judged,
+    label: int,
     in_training: FloatArray,
     *,
     n_bootstrap: int,
     rng: np.random.Generator,
 ) -> dict[str, Any]:
-    """Error of one class: ``predicted`` is (seed, record), all else (record,)."""
-    error = np.abs(predicted - truth).mean(axis=0)
-    unit = np.asarray(task.dataset.column("unit_id"))[record]
-    position = np.unique(unit, return_inverse=True)[1]
-    machines = machines_of(task.dataset, record)
-    support, drawn = machines.support(), machines.drawn(n_bootstrap, rng)
-    total, n_drawn = (
-        drawn @ np.bincount(position, weights=error),
-        drawn @ np.bincount(position),
+    """Error of the severities of one class, whose training records have those given."""
+    error = np.abs(judged.answers[..., label] - judged.truth).mean(axis=0)
+    drawn = judged.machines.drawn(n_bootstrap, rng)
+    resampled = ratio(
+        drawn @ np.bincount(judged.unit, weights=error),
+        drawn @ np.bincount(judged.unit),
     )
-    means = np.divide(
-        total, n_drawn, out=np.full(total.shape, np.nan), where=n_drawn > 0
-    )
+    means = np.concatenate([[error.mean()], resampled])
     known = in_training[~np.isnan(in_training)]
     constant = None
     if known.size:
-        constant = float(np.abs(np.median(known) - truth).mean())
+        constant = float(np.abs(np.median(known) - judged.truth).mean())
     return {
-        **spread_of(error.mean(), means, support),
+        **with_interval(means, judged.support, "linear"),
         "constant": constant,
-        "n_records": int(truth.size),
+        "n_records": int(judged.truth.size),
     }
 
 

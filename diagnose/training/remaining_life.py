@@ -13,8 +13,8 @@ from torch import nn
 
 from diagnose.data.windows import FloatArray, IntArray, WindowSet
 from diagnose.networks.registry import build_model
+from diagnose.scoring.hours import LifeFacts
 from diagnose.scoring.metrics import over_records
-from diagnose.training.life_facts import LifeFacts
 from diagnose.training.store import ModelDescription, load_network
 from diagnose.training.target import LearningTarget
 from gensig.options.configuration import Section

@@ -14,11 +14,11 @@ import numpy as np
 
 from diagnose.data.teeth import common_teeth, teeth_range
 from diagnose.data.windows import Task, subset_segments
-from diagnose.scoring.predictions import Outcome
+from diagnose.scoring.hours import LifeFacts
+from diagnose.scoring.predictions import Prediction
 from diagnose.settings import TrainSettings
 from diagnose.training.carried import Carried, carried_from, carried_in
 from diagnose.training.description_checks import OPTIONAL, REQUIRED, SCHEDULE
-from diagnose.training.life_facts import LifeFacts, life_facts
 from diagnose.training.model_files import (
     DESCRIPTION,
     DIGEST,
@@ -127,7 +127,7 @@ class ModelDescription:
 
 
 def model_description(
-    task: Task, settings: TrainSettings, run: Outcome
+    task: Task, settings: TrainSettings, run: Prediction
 ) -> ModelDescription:
     """Description of the network behind answers."""
     trained_on = subset_segments(task, run.protocol, "train").record
@@ -159,6 +159,7 @@ def model_description(
         out_of_distribution=facts,
         temperature=run.temperature,
         test_channel_names=None if tested == channels else tested,
+        remaining_life=run.hours,
         carried=carried_in(task, run.protocol),
     )
 
@@ -361,7 +362,7 @@ def _typed(content: Mapping[str, Any]) -> dict[str, Any]:
     values = dict(content)
     for name, reader in REQUIRED.items():
         values[name] = reader(name, values[name])
-    for name, reader in {**OPTIONAL, "remaining_life": life_facts}.items():
+    for name, reader in OPTIONAL.items():
         if values.get(name) is not None:
             values[name] = reader(name, values[name])
     if values.get("temperature", 1.0) is None:

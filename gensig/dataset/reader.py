@@ -28,11 +28,10 @@ from gensig.dataset.selection import (
 from gensig.dataset.shard_files import ShardFiles
 from gensig.dataset.splitting.protocols import NEW_MACHINE, PROTOCOLS, why_left_out
 from gensig.dataset.splitting.splits import SUBSETS, SplitTable, read_split
-from gensig.dataset.storage.attributes import HDF5_ERRORS, read_attributes
+from gensig.dataset.storage.attributes import read_attributes
 from gensig.dataset.storage.compression import compression_of
 from gensig.dataset.storage.guard import (
     datasets,
-    first_line,
     read_rows,
     unknown_class,
 )
@@ -240,10 +239,8 @@ class Dataset:
             missing = {"S": "", "f": np.nan}.get(dtype.kind, -1)
             kind = None if dtype.kind == "S" else dtype
             return np.full((entry.rows, *shape), missing, dtype=kind)
-        try:
-            values = read_rows(self._shards.open(shard)[name])
-        except HDF5_ERRORS as error:
-            raise self._shards.unreadable(shard, first_line(error)) from error
+        with self._shards.reading(shard) as file:
+            values = read_rows(file[name])
         if values.shape[1:] != shape:
             raise self._another_shape(shard, name)
         if name == "label" and (problem := unknown_class(values, self.class_names)):
@@ -321,11 +318,8 @@ class Dataset:
         if name not in known:
             raise unknown_name("signal", name, known, self.folder)
         shard, row, stop = self._position(record_index, start, stop)
-        file = self._shards.open(shard)
-        try:
+        with self._shards.reading(shard) as file:
             block = read_signal(file, name, row, start, stop)
-        except HDF5_ERRORS as error:
-            raise self._shards.unreadable(shard, first_line(error)) from error
         if block.shape != (len(self.channel_names), stop - start):
             raise self._another_shape(shard, name)
         if channels is None:
@@ -345,10 +339,8 @@ class Dataset:
         if name not in traces:
             raise unknown_name("trace", name, traces or ["none"], self.folder)
         shard, row, stop = self._position(record_index, start, stop)
-        try:
-            values = self._shards.open(shard)[name][row, ..., start:stop]
-        except HDF5_ERRORS as error:
-            raise self._shards.unreadable(shard, first_line(error)) from error
+        with self._shards.reading(shard) as file:
+            values = file[name][row, ..., start:stop]
         n_axes = len(signal_column(name).axes)
         if values.shape[-1:] != (stop - start,) or values.ndim != n_axes:
             raise self._another_shape(shard, name)

@@ -2,6 +2,8 @@
 
 import os
 from collections import OrderedDict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +41,7 @@ class ShardFiles:
     def __init__(self, folder: Path, manifest: Manifest) -> None:
         self.folder = folder
         self.manifest = manifest
-        self.starts = np.cumsum([0, *(entry.rows for entry in manifest.shards)])
+        self.starts = np.cumsum([0, *manifest.shard_sizes])
         self._plan: PlanRows | None = None
         self._labelled: bool | None = None
         self._files: OrderedDict[int, h5py.File] = OrderedDict()
@@ -67,6 +69,14 @@ class ShardFiles:
         if len(self._files) > MAX_OPEN_SHARDS:
             self._files.popitem(last=False)[1].close()
         return file
+
+    @contextmanager
+    def reading(self, shard: int) -> Iterator[h5py.File]:
+        """The file as `open` gives it; what HDF5 raises in the block names the shard."""
+        try:
+            yield self.open(shard)
+        except HDF5_ERRORS as error:
+            raise self.unreadable(shard, first_line(error)) from error
 
     def _opened(self, path: Path, shard: int) -> h5py.File:
         if shard in self._checked and self._checked[shard] == same_file(path):

@@ -76,6 +76,16 @@ class DynamicRootStress:
     history: RootHistory
     passes: dict[str, Array]
 
+    @classmethod
+    def of(
+        cls, strength: RootStrength, history: RootHistory, share: Array
+    ) -> DynamicRootStress:
+        """The stress under shares (pass, point) of the greatest force, that of ``strength``."""
+        passes = {name: share * stress for name, stress in history.stress.items()}
+        return cls(
+            strength=strength, gears=strength.gears(), history=history, passes=passes
+        )
+
 
 def with_further_dampers(
     line: EngineLine, dampers: Sequence[TorsionalDamper]
@@ -203,12 +213,7 @@ def dynamic_root_stress(
         np.maximum(np.interp(crank, angle, load.force, period=CYCLE), 0.0)
         / load.greatest
     )
-    return DynamicRootStress(
-        strength=loaded,
-        gears=loaded.gears(),
-        history=history,
-        passes={name: share * stress for name, stress in history.stress.items()},
-    )
+    return DynamicRootStress.of(loaded, history, share)
 
 
 def passes_of_a_cycle(line: EngineLine, mesh: int) -> int:

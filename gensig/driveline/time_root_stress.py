@@ -62,12 +62,7 @@ def root_stress_in_time(
             "root stress in time needs two cycles of the crank at least; simulate longer"
         )
     share = np.maximum(np.interp(crank[inside], crank_angle, force), 0.0) / greatest
-    return DynamicRootStress(
-        strength=loaded,
-        gears=loaded.gears(),
-        history=history,
-        passes={name: share * stress for name, stress in history.stress.items()},
-    )
+    return DynamicRootStress.of(loaded, history, share)
 
 
 def typical_largest(passes: Array, in_cycle: int) -> float:

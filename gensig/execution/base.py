@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from gensig.errors import ConfigError
+from gensig.options.configuration import whole_number
 
 T = TypeVar("T")
 
@@ -79,14 +79,4 @@ def read_n_workers(requested: Any) -> int:
         if hasattr(os, "sched_getaffinity"):
             return len(os.sched_getaffinity(0))
         return os.cpu_count() or 1
-    return whole_number("n_workers", requested, at_least=1)
-
-
-def whole_number(key: str, value: Any, *, at_least: int) -> int:
-    """Check a whole number among the keys of ``executor``."""
-    if isinstance(value, bool) or not isinstance(value, int) or value < at_least:
-        null = ", or null" if key == "n_workers" else ""
-        raise ConfigError(
-            f"executor.{key} = {value!r} must be a whole number of at least {at_least}{null}"
-        )
-    return value
+    return whole_number("executor.n_workers", requested, at_least=1, also=", or null")

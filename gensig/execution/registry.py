@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 from gensig.errors import ConfigError
 from gensig.execution.array import ArrayExecutor
-from gensig.execution.base import Executor, read_n_workers, whole_number
+from gensig.execution.base import Executor, read_n_workers
 from gensig.execution.dask import DaskExecutor
 from gensig.execution.local import LocalExecutor
-from gensig.options.configuration import Section
+from gensig.options.configuration import Section, whole_number
 
 
 def _local(section: Section) -> Executor:
@@ -34,8 +34,12 @@ def _slurm(section: Section) -> Executor:
             "executor.shard_count=$SLURM_ARRAY_TASK_COUNT"
         )
     return ArrayExecutor(
-        shard_index=whole_number("shard_index", section["shard_index"], at_least=0),
-        shard_count=whole_number("shard_count", section["shard_count"], at_least=1),
+        shard_index=whole_number(
+            "executor.shard_index", section["shard_index"], at_least=0
+        ),
+        shard_count=whole_number(
+            "executor.shard_count", section["shard_count"], at_least=1
+        ),
         n_workers=read_n_workers(section["n_workers"]),
     )
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +28,8 @@ N_STRIPS = 32  # across a triangular chip
 class MissingTooth(Fault):
     """A missing tooth: its tooth pair never touches."""
 
-    kind: ClassVar[str] = "missing_tooth"
-    growth: ClassVar[Growth] = Growth.NONE
-    sizes: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    kind = "missing_tooth"
+    growth = Growth.NONE
 
     def severity(self, gear: Gear) -> float:
         """Always 1."""
@@ -54,9 +52,9 @@ class BrokenTooth(Fault):
     burr that falls to nothing ``broken_edge_width`` below it.
     """
 
-    kind: ClassVar[str] = "broken"
-    growth: ClassVar[Growth] = Growth.NONE
-    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (("broken_height_mm",),)
+    kind = "broken"
+    growth = Growth.NONE
+    sizes = (("broken_height_mm",),)
     broken_height: float = unit("mm")
     broken_edge_height: float = unit("um", default=0.0)
     broken_edge_width: float = unit("mm", default=0.0)
@@ -90,9 +88,9 @@ class ChippedTooth(Fault):
     broken tooth.
     """
 
-    kind: ClassVar[str] = "chipped"
-    growth: ClassVar[Growth] = Growth.NONE
-    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (
+    kind = "chipped"
+    growth = Growth.NONE
+    sizes = (
         ("chip_height_mm",),
         ("chip_width_mm",),
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,9 +40,9 @@ class Crack(Fault):
     ``mesh.crack`` selects the compliance model.
     """
 
-    kind: ClassVar[str] = "crack"
-    growth: ClassVar[Growth] = Growth.PARIS
-    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (
+    kind = "crack"
+    growth = Growth.PARIS
+    sizes = (
         ("crack_depth_mm",),
         ("crack_width_mm",),
     )

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,9 +55,9 @@ class FlankForm(Fault):
 class PitchError(FlankForm):
     """A tooth ``pitch_error`` behind its position along the line of action; negative: in front."""
 
-    kind: ClassVar[str] = "pitch_error"
-    growth: ClassVar[Growth] = Growth.NONE
-    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (("pitch_error_um",),)
+    kind = "pitch_error"
+    growth = Growth.NONE
+    sizes = (("pitch_error_um",),)
     pitch_error: float = unit("um")
 
     def size(self) -> float:
@@ -79,11 +78,9 @@ class ProfileError(FlankForm):
     behind the nominal flank.
     """
 
-    kind: ClassVar[str] = "profile_error"
-    growth: ClassVar[Growth] = Growth.NONE
-    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (
-        ("profile_slope_um", "profile_form_um"),
-    )
+    kind = "profile_error"
+    growth = Growth.NONE
+    sizes = (("profile_slope_um", "profile_form_um"),)
     profile_slope: float = unit("um")
     profile_form: float = unit("um")
     profile_waves: float
@@ -112,10 +109,10 @@ class Runout(FlankForm):
     out (second order).
     """
 
-    kind: ClassVar[str] = "runout"
-    growth: ClassVar[Growth] = Growth.NONE
-    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (("eccentricity_um",),)
-    alike: ClassVar[bool] = False
+    kind = "runout"
+    growth = Growth.NONE
+    sizes = (("eccentricity_um",),)
+    alike = False
     eccentricity: float = unit("um")
 
     def __post_init__(self) -> None:
@@ -152,10 +149,10 @@ class Runout(FlankForm):
 class Misalignment(FlankForm):
     """Flanks that stand back ``misalignment`` more at one end of the face; its sign says which."""
 
-    kind: ClassVar[str] = "misalignment"
-    growth: ClassVar[Growth] = Growth.NONE
-    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (("misalignment_um",),)
-    of_mounting: ClassVar[bool] = True
+    kind = "misalignment"
+    growth = Growth.NONE
+    sizes = (("misalignment_um",),)
+    of_mounting = True
     misalignment: float = unit("um")
 
     def size(self) -> float:
@@ -182,9 +179,9 @@ class Wear(FlankForm):
     involute to the tip; None is uniform wear.
     """
 
-    kind: ClassVar[str] = "wear"
-    growth: ClassVar[Growth] = Growth.ARCHARD
-    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (("wear_depth_um",),)
+    kind = "wear"
+    growth = Growth.ARCHARD
+    sizes = (("wear_depth_um",),)
     wear_depth: float = unit("um")
     wear_profile: tuple[float, ...] | None = None
 
@@ -217,9 +214,9 @@ class Wear(FlankForm):
 class TipRelief(FlankForm):
     """A tip relieved by ``relief``, over ``relief_length`` along the line of action."""
 
-    kind: ClassVar[str] = "tip_relief"
-    growth: ClassVar[Growth] = Growth.NONE
-    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (
+    kind = "tip_relief"
+    growth = Growth.NONE
+    sizes = (
         ("relief_um",),
         ("relief_length_mm",),
     )

@@ -76,14 +76,14 @@ class Pitting(Hole):
     Source: spur paper section 3.2, eqs. (13) to (18); h in (14) and (15) is the pit depth.
     """
 
-    kind: ClassVar[str] = "pitting"
-    growth: ClassVar[Growth] = Growth.NONE
-    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (
+    kind = "pitting"
+    growth = Growth.NONE
+    sizes = (
         ("pit_length_mm",),
         ("pit_width_mm",),
         ("pit_depth_mm", "pit_edge_height_um"),
     )
-    prefix: ClassVar[str] = "pit"
+    prefix = "pit"
     pit_length: float = unit("mm")
     pit_width: float = unit("mm")
     pit_depth: float = unit("mm")
@@ -113,14 +113,14 @@ class Spalling(Hole):
     Positions and raised edge as in ``Pitting``.
     """
 
-    kind: ClassVar[str] = "spalling"
-    growth: ClassVar[Growth] = Growth.NONE
-    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (
+    kind = "spalling"
+    growth = Growth.NONE
+    sizes = (
         ("spall_length_mm",),
         ("spall_width_mm",),
         ("spall_depth_mm", "spall_edge_height_um"),
     )
-    prefix: ClassVar[str] = "spall"
+    prefix = "spall"
     spall_length: float = unit("mm")
     spall_width: float = unit("mm")
     spall_depth: float = unit("mm")
@@ -181,10 +181,10 @@ class DistributedPitting(Fault):
     pits; a larger share includes all pits of a smaller one. Raised edges as in ``Pitting``.
     """
 
-    kind: ClassVar[str] = "distributed_pitting"
-    growth: ClassVar[Growth] = Growth.PITS
-    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (("pitted_share",),)
-    alike: ClassVar[bool] = False
+    kind = "distributed_pitting"
+    growth = Growth.PITS
+    sizes = (("pitted_share",),)
+    alike = False
     pitted_share: float
     pit_diameter: float = unit("mm")
     diameter_scatter: float

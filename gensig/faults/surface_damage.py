@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,10 +56,10 @@ class SurfaceDamage(Fault):
     are assumed, see ``docs/theory/surface_damage.md``.
     """
 
-    kind: ClassVar[str] = "surface_damage"
-    growth: ClassVar[Growth] = Growth.NONE
-    sizes: ClassVar[tuple[tuple[str, ...], ...]] = (("damage",),)
-    alike: ClassVar[bool] = False
+    kind = "surface_damage"
+    growth = Growth.NONE
+    sizes = (("damage",),)
+    alike = False
     damage: float
     spalled_share: float
     spall_length_share: float

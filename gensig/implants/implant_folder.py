@@ -6,9 +6,7 @@ on with the bits of an undisturbed one, or says which source is gone.
 
 from __future__ import annotations
 
-import dataclasses
 import functools
-import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -22,6 +20,7 @@ from gensig.dataset.folder.layout import (
     PLAN,
     ConfigContent,
     Manifest,
+    ShardEntry,
     read_config,
     read_manifest,
     shard_path,
@@ -30,7 +29,7 @@ from gensig.dataset.folder.manifest import differing_keys, identity_hash
 from gensig.dataset.folder.run_log import log
 from gensig.dataset.plan import Plan, plan_text
 from gensig.dataset.schema import IDENTITY, SCHEMA_VERSION
-from gensig.dataset.storage.atomic import sha256_file
+from gensig.dataset.storage.atomic import sha256_file, sha256_text
 from gensig.dataset.storage.attributes import Attribute
 from gensig.dataset.storage.guard import same_file
 from gensig.dataset.storage.receipts import write_receipt
@@ -46,9 +45,8 @@ from gensig.implants.implant_sources import (
     source_words,
 )
 from gensig.implants.implanting import Implanter
-from gensig.production.maker import SIMULATION, Maker
+from gensig.production.folder import SIMULATION, Maker
 from gensig.production.record_counts import RecordCounts
-from gensig.production.shard_writing import WrittenShard
 from gensig.signals.resampling import PASS_SHARE
 from gensig.version import __version__
 
@@ -70,7 +68,6 @@ def begin_implants(out: Path, implanter: Implanter, sources: ImplantSources) -> 
         config=config | {FINGERPRINTS: _fingerprints(implanter)},
         overrides=source_words(sources, out),
         plan=plan,
-        identity=identity_hash(config, __version__),
         seed=implanter.options.seed,
         generator_version=__version__,
     )
@@ -96,7 +93,7 @@ def write_implant_shard(
     *,
     counts: RecordCounts | None = None,
     implanter: Implanter | None = None,
-) -> WrittenShard:
+) -> ShardEntry:
     """Write one shard; its bits depend on the folder's sources only.
 
     Parameters
@@ -121,11 +118,8 @@ def write_implant_shard(
             writer.write(row, {"acceleration": signal}, values)
             if counts is not None:
                 counts.set(shard_index, row + 1)
-    written = WrittenShard(
-        sha256=writer.sha256, n_bytes=writer.n_bytes, n_failed=writer.n_failed
-    )
-    write_receipt(out, shard_index, rows=n_rows, **dataclasses.asdict(written))
-    return written
+    write_receipt(out, shard_index, writer.entry)
+    return writer.entry
 
 
 def _implanter(out: Path) -> Implanter:
@@ -143,7 +137,7 @@ def _opened(out: Path, _changed: tuple[int, ...]) -> Implanter:
     if identity_hash(made, __version__) != manifest.identity or keys:
         raise _other_set(out, f"another {', '.join(keys[:3])}")
     text = plan_text(implanter.plan.table)
-    if hashlib.sha256(text.encode()).hexdigest() != manifest.files.get(PLAN):
+    if sha256_text(text) != manifest.files.get(PLAN):
         raise _other_set(out, f"another {PLAN}")
     return implanter
 

@@ -131,25 +131,18 @@ def _chosen_options(config_name: str, words: tuple[str, ...]) -> DictConfig:
 
 def _resolved(config: DictConfig) -> dict[str, Any]:
     """A composition with its references resolved, which may be those to keys alone."""
-    check_references(config)
-    values = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
-    assert isinstance(values, dict)
-    refuse_references(values, "a composed configuration")
-    plain = {str(key): value for key, value in values.items()}
+    check_tree(plain_tree(config))
+    plain = plain_tree(config, resolve=True, throw_on_missing=True)
+    refuse_references(plain, "a composed configuration")
     check_values(plain)
     return plain
 
 
-def check_references(config: DictConfig) -> None:
-    """Refuse a composition whose references must not be resolved.
-
-    Raises
-    ------
-    ConfigError    see `gensig.options.references.check_tree`
-    """
-    tree = OmegaConf.to_container(config, resolve=False)
+def plain_tree(config: DictConfig, **how: Any) -> dict[str, Any]:
+    """A composition as plain nested dictionaries; ``how`` goes to ``OmegaConf.to_container``."""
+    tree = OmegaConf.to_container(config, **how)
     assert isinstance(tree, dict)
-    check_tree({str(key): value for key, value in tree.items()})
+    return {str(key): value for key, value in tree.items()}
 
 
 def composed_groups(
@@ -161,11 +154,7 @@ def composed_groups(
     ------
     ConfigError    for an unknown group or option
     """
-    content = OmegaConf.to_container(
-        _hydra_composed(config_name, tuple(words), config_dir), resolve=False
-    )
-    assert isinstance(content, dict)
-    return {str(key): value for key, value in content.items()}
+    return plain_tree(_hydra_composed(config_name, tuple(words), config_dir))
 
 
 def _composed(

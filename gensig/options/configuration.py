@@ -51,8 +51,26 @@ class MissingKeyError(ConfigError, KeyError):
     __str__ = Exception.__str__
 
 
+class _Keys(Mapping[str, Any]):
+    """Names and values that are not changed."""
+
+    __slots__ = ("_values",)
+
+    _values: Mapping[str, Any]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def plain(self) -> dict[str, Any]:
+        """A deep copy as nested dictionaries, for files and for code that changes it."""
+        return copy.deepcopy(dict(self._values))
+
+
 @final
-class Section(Mapping[str, Any]):
+class Section(_Keys):
     """One group of keys of a configuration, read-only.
 
     Attributes
@@ -60,7 +78,7 @@ class Section(Mapping[str, Any]):
     name : dotted path, as error messages print it, for instance ``"gear.pinion"``
     """
 
-    __slots__ = ("_values", "name")
+    __slots__ = ("name",)
 
     def __init__(self, name: str, values: Mapping[str, Any]) -> None:
         self.name = name
@@ -72,12 +90,6 @@ class Section(Mapping[str, Any]):
         if key not in self._values:
             raise MissingKeyError(self.name, key)
         return self._values[key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._values)
-
-    def __len__(self) -> int:
-        return len(self._values)
 
     def __repr__(self) -> str:
         return f"Section({self.name!r}, {dict(self._values)!r})"
@@ -107,23 +119,19 @@ class Section(Mapping[str, Any]):
         """The frozen dataclass that the keys fill; see `gensig.units.read`."""
         return read(cls, self._values, self.name, **given)
 
-    def plain(self) -> dict[str, Any]:
-        """A deep copy of the keys as a dictionary, for files."""
-        return copy.deepcopy(dict(self._values))
-
 
 @final
-class Configuration(Mapping[str, Any]):
+class Configuration(_Keys):
     """A composed configuration, read-only: groups of keys as `Section`, other keys as plain values.
 
     ``config["seed"]`` is a value and ``config["plan"]`` a `Section`. Changed configurations are new
     ones: `with_values`, `with_entries`. It can be pickled and compared.
     """
 
-    __slots__ = ("_values",)
+    __slots__ = ()
 
     def __init__(self, values: Mapping[str, Any]) -> None:
-        self._values: dict[str, Any] = {
+        self._values = {
             name: dict(value._values) if type(value) is Section else value
             for name, value in values.items()
         }
@@ -133,12 +141,6 @@ class Configuration(Mapping[str, Any]):
             raise MissingKeyError("the configuration", key)
         value = self._values[key]
         return Section(key, value) if isinstance(value, Mapping) else value
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._values)
-
-    def __len__(self) -> int:
-        return len(self._values)
 
     def __repr__(self) -> str:
         return f"Configuration({', '.join(self._values)})"
@@ -180,10 +182,6 @@ class Configuration(Mapping[str, Any]):
             self._replace(changed, key, value)
         return Configuration(changed)
 
-    def plain(self) -> dict[str, Any]:
-        """A deep copy as nested dictionaries, for files and for code that changes it."""
-        return copy.deepcopy(self._values)
-
     def _replace(self, changed: dict[str, Any], key: str, value: float) -> None:
         """Set a dotted key that must exist and hold a number, in copies of its groups."""
         if key.startswith(FIXED_KEYS):
@@ -213,11 +211,11 @@ class Configuration(Mapping[str, Any]):
         node[leaf] = int(value) if is_count else value
 
 
-def whole_number(key: str, value: Any, *, at_least: int) -> int:
-    """A count of a configuration, checked."""
+def whole_number(key: str, value: Any, *, at_least: int, also: str = "") -> int:
+    """A count of a configuration, checked; ``also`` names what else its key takes."""
     if isinstance(value, bool) or not isinstance(value, int) or value < at_least:
         raise ConfigError(
-            f"{key} = {value!r} must be a whole number of at least {at_least}"
+            f"{key} = {value!r} must be a whole number of at least {at_least}{also}"
         )
     return value
 

@@ -13,14 +13,14 @@ from omegaconf.errors import OmegaConfBaseException
 from gensig.errors import ConfigError
 from gensig.options import files as option_files
 from gensig.options.compose import (
-    check_references,
     composed_groups,
     dotted_keys,
     nearest_key,
+    plain_tree,
 )
 from gensig.options.groups import group_names, parse
 from gensig.options.plain_values import check_values
-from gensig.options.references import refuse_references
+from gensig.options.references import check_tree, refuse_references
 
 
 def changed_content(
@@ -70,21 +70,18 @@ def changed_content(
         except OmegaConfBaseException:
             near = nearest_key(key, dotted_keys(dict(content)))
             raise ConfigError(f"unknown key '{key}'{near}") from None
-    check_references(config)
+    check_tree(plain_tree(config))
     try:
-        result = OmegaConf.to_container(config, resolve=True)
+        result = plain_tree(config, resolve=True)
     except OmegaConfBaseException as error:
         text = " ".join(str(error).split())
         raise ConfigError(
             f"a stored configuration cannot be changed so: {text}"
         ) from None
-    assert isinstance(result, dict)
     refuse_references(result, "a stored configuration")
-    check_values({str(key): value for key, value in result.items()})
+    check_values(result)
     return {
-        str(key): value
-        for key, value in result.items()
-        if value is not None or key == "out"
+        key: value for key, value in result.items() if value is not None or key == "out"
     }
 
 

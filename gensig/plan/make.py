@@ -130,8 +130,7 @@ def make_plan(config: Configuration) -> Plan:
             fault = faults[names[label]][condition]
             if not options.sham:
                 require_size(read_faults(fault))
-            drawn_columns = _row(machine, fault, values, start, sham=options.sham)
-            rows.append(ids | drawn_columns | _gear_columns(options, machine))
+            rows.append(ids | _row(options, machine, fault, values, start))
     if options.n_reference:
         rows = [row | {IS_REFERENCE: 0} for row in rows]
         label = names.index(sound[0])
@@ -166,17 +165,9 @@ def _reference_rows(
         machine.pair.require_continuous_drive()
         start = stream(reader.seed, Stream.TWIN, condition)
         ids = _ids(options, label, unit, gearbox, specimen, condition, 0)
-        row = _row(machine, fault, values, start, sham=options.sham)
-        gears = _gear_columns(options, machine)
-        rows.append(ids | row | gears | {IS_REFERENCE: 1})
+        row = _row(options, machine, fault, values, start)
+        rows.append(ids | row | {IS_REFERENCE: 1})
     return rows
-
-
-def _gear_columns(options: PlanOptions, machine: Machine) -> dict[str, int | float]:
-    """Teeth and geometry of a record's gears, where units differ in them."""
-    if not options.varies_gears:
-        return {}
-    return gear_columns(machine.pair)
 
 
 def _plan_of_lives(reader: InputReader) -> Plan:
@@ -190,11 +181,11 @@ def _plan_of_lives(reader: InputReader) -> Plan:
         unit, gearbox = look.unit, look.unit % n_gearboxes
         ids = _ids(options, look.label, unit, gearbox, unit, look.condition, 0)
         drawn_columns = _row(
+            options,
             reader.machine(look.values),
             look.fault,
             look.values,
             stream(reader.seed, Stream.START, len(rows)),
-            sham=options.sham,
             is_checked=look.is_last,
         )
         rows.append(ids | drawn_columns | look.columns)
@@ -369,18 +360,18 @@ def _fitting(plan: PlanOptions, n_records: int, counts: tuple[int, ...]) -> int:
 
 
 def _row(
+    options: PlanOptions,
     machine: Machine,
     fault: Mapping[str, Any],
     values: Mapping[str, float],
     rng: np.random.Generator,
     *,
-    sham: bool,
     is_checked: bool = True,
 ) -> dict[str, Any]:
     """Columns of one record that follow from its drawn values.
 
-    ``sham`` gives severity 0. The teeth of a record need no check where a larger fault of the
-    same life is checked: ``is_checked`` is false.
+    Those of its gears are among them where units differ in them. The teeth of a record need no
+    check where a larger fault of the same life is checked: ``is_checked`` is false.
     """
     faults = read_faults(fault)
     if is_checked:
@@ -402,13 +393,15 @@ def _row(
     }
     if row["snr_db"] is None:
         row["snr_db"] = MISSING
-    if not sham:
+    if not options.sham:
         row["severity"] = severity(faults, machine.gears)
     if faults:
         row["fault_gear"] = faults[0].gear
         row["fault_tooth"] = faults[0].first_tooth
     row |= {f"params/{key}": float(value) for key, value in values.items()}
     row |= {f"params/fault.{key}": size for key, size in fault_sizes(fault).items()}
+    if options.varies_gears:
+        row |= gear_columns(machine.pair)
     return row
 
 

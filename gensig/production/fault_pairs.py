@@ -315,8 +315,7 @@ def _contrasts(
 def _noise_power(inputs: RecordInputs, sound: CleanRecord) -> Array:
     instrument, sensing = inputs.instrument, inputs.machine.sensing
     reference = instrument.power(instrument.measure(sound.acceleration))
-    n_samples = round(inputs.machine.operating.duration * sensing.sampling_rate)
-    return sensing.noise_power(reference, n_samples)
+    return sensing.noise_power(reference, inputs.machine.n_samples)
 
 
 def _power_of_units(reader: InputReader, rows: Sequence[Row]) -> Array:
@@ -339,7 +338,7 @@ def _noise_shape(reader: InputReader, rows: Sequence[Row]) -> Array:
     for unit, row in enumerate(rows):
         inputs = reader.inputs(row)
         sensing = inputs.machine.sensing
-        n_samples = round(inputs.machine.operating.duration * sensing.sampling_rate)
+        n_samples = inputs.machine.n_samples
         silent = np.zeros((len(sensing.channel_names), n_samples))
         ideal = Instrument(
             sensing=replace(sensing, sensor=None),

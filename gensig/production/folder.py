@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
+import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gensig.dataset.folder.beginning import create_folder
 from gensig.dataset.folder.closing import finalize
 from gensig.dataset.folder.failures import commonest, failure_reasons
-from gensig.dataset.folder.joining import agreed_folder, joined_folder
+from gensig.dataset.folder.joining import joined_folder
 from gensig.dataset.folder.layout import (
+    MANIFEST,
     SHARDS,
     ConfigContent,
     Manifest,
@@ -20,12 +21,8 @@ from gensig.dataset.folder.layout import (
     read_manifest,
     shard_path,
 )
-from gensig.dataset.folder.manifest import (
-    identity_hash,
-    record_failed_shard,
-    record_shard,
-)
-from gensig.dataset.folder.quick_check import size_problem
+from gensig.dataset.folder.manifest import record_shards
+from gensig.dataset.folder.quick_check import absences, size_problem
 from gensig.dataset.folder.run_log import log
 from gensig.dataset.plan import Plan
 from gensig.dataset.schema import SAMPLE_TYPES
@@ -34,25 +31,56 @@ from gensig.dataset.storage.compression import COMPRESSIONS, creation_options
 from gensig.dataset.storage.receipts import (
     collect_receipts,
     receipt_path,
+    shard_entries,
 )
-from gensig.errors import ConfigError
-from gensig.execution.base import Executor, ShardFailure
+from gensig.errors import ConfigError, SimulationError
+from gensig.execution.base import Executor, ShardFailure, read_n_workers
+from gensig.execution.local import LocalExecutor
+from gensig.execution.registry import read_executor
 from gensig.options.configuration import Configuration
+from gensig.options.typed_only import refuse_untyped
+from gensig.plan.doubts import plan_doubts
 from gensig.plan.make import make_plan
-from gensig.production.maker import SIMULATION, Maker
-from gensig.production.record_counts import RecordCounts
+from gensig.plan.request import Request, read_request
+from gensig.production.record_counts import RecordCounts, record_counts
 from gensig.production.restoring import restore_index, restore_tables
 from gensig.production.run_check import (
     folder_kept,
     lost_shards,
     require_tables,
     require_whole,
-    shard_entries,
 )
-from gensig.production.shard_writing import WrittenShard
+from gensig.production.shard_writing import write_shard
 from gensig.record.inputs import InputReader
-from gensig.terminal.run_progress import Progress
+from gensig.terminal.run_progress import Progress, RunProgress
 from gensig.version import __version__
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Maker:
+    """Functions that make parts of a folder, each with the bits that they had.
+
+    Attributes
+    ----------
+    plan : takes folder and configuration
+    check : takes the folder; raises GensigError where no shard can be made, with one line
+    write : takes folder, number of a shard and ``counts``; executors pickle it
+    """
+
+    plan: Callable[[Path, ConfigContent], Plan]
+    check: Callable[[Path], None]
+    write: Callable[..., ShardEntry]
+
+
+def _plan(_out: Path, config: ConfigContent) -> Plan:
+    return make_plan(Configuration(config))
+
+
+def _check(_out: Path) -> None:
+    """A simulation needs nothing but the folder."""
+
+
+SIMULATION = Maker(plan=_plan, check=_check, write=write_shard)
 
 
 def begin_folder(config: Configuration, overrides: Sequence[str], out: Path) -> Plan:
@@ -74,35 +102,12 @@ def begin_folder(config: Configuration, overrides: Sequence[str], out: Path) -> 
         config=recorded,
         overrides=overrides,
         plan=plan,
-        identity=identity_hash(recorded, __version__),
         seed=config.seed,
         generator_version=__version__,
     )
     planned = f"{plan.n_records} records in {plan.n_shards} shards are planned"
     log(out, f"gensig {__version__}: {planned}")
     return plan
-
-
-@dataclass(slots=True, kw_only=True)
-class _Tally:
-    """Records of a run: those on disk, and those that it made."""
-
-    n_records: int
-    n_done: int
-    n_failed: int
-    n_made: int = 0
-    n_bytes: int = 0
-
-    def add(self, n_records: int, shard: WrittenShard) -> None:
-        """Count a shard that was made."""
-        self.n_done += n_records
-        self.n_made += n_records
-        self.n_failed += shard.n_failed
-        self.n_bytes += shard.n_bytes
-
-    def progress(self, reason: str = "") -> Progress:
-        """The state after a shard; ``reason`` says why it could not be made."""
-        return Progress(**dataclasses.asdict(self), reason=reason)
 
 
 def run_folder(
@@ -141,15 +146,17 @@ def _join(
     out: Path, asked: ConfigContent | None, maker: Maker, *, closes: bool
 ) -> None:
     """Refuse a folder of another version or configuration; restore lost tables of one to close."""
-    if closes:
-        manifest, config = agreed_folder(out, asked=asked)
+    if not closes:
+        joined_folder(out, asked=asked)
+        return
+
+    def restore(manifest: Manifest, config: ConfigContent) -> None:
         restore_tables(out, manifest, lambda: maker.plan(out, config))
-    joined_folder(out, asked=asked)
-    if closes:
-        collect_receipts(out)
-        manifest = read_manifest(out)
-        if not manifest.is_complete:
-            require_tables(out, manifest)
+
+    manifest, _ = joined_folder(out, asked=asked, restore=restore)
+    collect_receipts(out)
+    if not manifest.is_complete:
+        require_tables(out, manifest)
 
 
 def _run_shards(
@@ -161,17 +168,20 @@ def _run_shards(
 ) -> tuple[int, list[str]]:
     """See `run_folder`."""
     manifest = read_manifest(out)
-    rows = [entry.rows for entry in manifest.shards]
+    rows = manifest.shard_sizes
     mine = executor.share(range(len(rows)))
-    entries = shard_entries(out, mine)
+    entries = shard_entries(out, manifest, mine)
     missing = [index for index in mine if not _is_there(out, index, entries[index])]
     if missing:
         maker.check(out)
     done = [index for index in mine if index not in missing]
-    tally = _Tally(
+    progress = Progress(
         n_records=sum(rows[index] for index in mine),
         n_done=sum(rows[index] for index in done),
         n_failed=sum(entries[index].n_failed for index in done),
+        n_made=0,
+        n_bytes=0,
+        reason="",
     )
     problems: list[str] = []
     made: dict[int, str] = {}
@@ -180,7 +190,7 @@ def _run_shards(
     if logged:
         n_missing = f"{len(missing)} of {len(mine)} shards to make"
         log(out, f"gensig {__version__}, {executor}: {n_missing}")
-    on_shard(tally.progress())
+    on_shard(progress)
     job = functools.partial(maker.write, out, counts=counts)
     try:
         for index, result in executor.run(job, missing):
@@ -189,10 +199,10 @@ def _run_shards(
             reason = _recorded(out, index, result, manifest, closes=executor.closes)
             if reason:
                 problems.append(reason)
-            elif isinstance(result, WrittenShard):
+            elif isinstance(result, ShardEntry):
                 made[index] = result.sha256
-                tally.add(rows[index], result)
-            on_shard(tally.progress(reason))
+                progress = _counted(progress, result)
+            on_shard(replace(progress, reason=reason))
         if not problems:
             problems = lost_shards(out, mine, made)
     except BaseException as error:
@@ -201,13 +211,24 @@ def _run_shards(
         raise
     if executor.closes and not problems:
         _close(out)
-    return tally.n_failed, problems
+    return progress.n_failed, problems
+
+
+def _counted(progress: Progress, shard: ShardEntry) -> Progress:
+    """The state after a shard that was made."""
+    return replace(
+        progress,
+        n_done=progress.n_done + shard.rows,
+        n_made=progress.n_made + shard.rows,
+        n_failed=progress.n_failed + shard.n_failed,
+        n_bytes=progress.n_bytes + shard.bytes,
+    )
 
 
 def _recorded(
     out: Path,
     index: int,
-    result: WrittenShard | ShardFailure,
+    result: ShardEntry | ShardFailure,
     manifest: Manifest,
     *,
     closes: bool,
@@ -222,19 +243,19 @@ def _recorded(
     if isinstance(result, ShardFailure):
         reason = f"shard {index}: {result.reason}"
         if closes:
-            record_failed_shard(out, index)
+            record_shards(out, {index: manifest.shards[index].failed()})
             log(out, f"{reason}; not made")
         return reason
     if closes:
-        record_shard(out, index, result.sha256, result.n_bytes, result.n_failed)
+        record_shards(out, {index: result})
         receipt_path(out, index).unlink(missing_ok=True)
-        sizes = f"{result.n_failed} failed, {result.n_bytes} bytes"
-        log(out, f"shard {index}: {manifest.shards[index].rows} records, {sizes}")
+        sizes = f"{result.n_failed} failed, {result.bytes} bytes"
+        log(out, f"shard {index}: {result.rows} records, {sizes}")
     return ""
 
 
 def _again(
-    out: Path, index: int, result: WrittenShard | ShardFailure, entry: ShardEntry
+    out: Path, index: int, result: ShardEntry | ShardFailure, entry: ShardEntry
 ) -> str:
     """The reason why a lost shard of a closed folder is not as it was, or ''."""
     receipt_path(out, index).unlink(missing_ok=True)
@@ -289,3 +310,48 @@ def close_folder(out: Path) -> int:
         collect_receipts(out)
         _close(out)
     return read_manifest(out).n_failed
+
+
+def make_folder(
+    overrides: Sequence[str],
+    out: Path,
+    *,
+    config_dir: str | Path | None,
+    workers: int | None,
+    progress: bool,
+    reuse: bool,
+) -> None:
+    """Make a data set, or finish the same one with ``reuse``; see ``gensig.generate``."""
+    request = read_request(overrides, config_dir=config_dir)
+    executor = _executor(request, workers)
+    if reuse and (out / MANIFEST).is_file():
+        joined_folder(out, asked=request.config.with_entries(out=None).plain())
+    else:
+        plan = begin_folder(request.config, request.overrides, out)
+        for text in plan_doubts(InputReader(request.config), plan):
+            warnings.warn(text, stacklevel=3)
+    manifest = read_manifest(out)
+    if manifest.is_complete and not absences(out, manifest):
+        return
+    with record_counts(len(manifest.shards)) as counts:
+        shown = RunProgress(
+            quiet=not progress, n_records=manifest.n_records, counts=counts
+        )
+        with shown:
+            _, problems = run_folder(
+                out, executor=executor, on_shard=shown, counts=counts
+            )
+    if problems:
+        raise SimulationError(f"{out} is incomplete: {problems[0]}")
+
+
+def _executor(request: Request, workers: int | None) -> Executor:
+    refuse_untyped(request.config.with_entries(out=None), request.overrides)
+    if workers is not None:
+        return LocalExecutor(n_workers=read_n_workers(workers))
+    executor = read_executor(request.config["executor"])
+    if not executor.closes:
+        raise ConfigError(
+            "a task of an array job makes its share of a folder only; run it as `gensig generate`"
+        )
+    return executor

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,15 +14,13 @@ from gensig.dataset.folder.layout import (
 )
 from gensig.dataset.plan import Plan, plan_text, read_plan
 from gensig.dataset.splitting.protocols import make_splits
-from gensig.dataset.storage.atomic import write_text
+from gensig.dataset.storage.atomic import sha256_text, write_text
 from gensig.dataset.storage.index import write_index
 from gensig.errors import DatasetError
 
 
-def restore_tables(
-    out: Path, manifest: Manifest, make: Callable[[], Plan]
-) -> list[str]:
-    """Make the plan and the splits again that a folder lacks; returns their names.
+def restore_tables(out: Path, manifest: Manifest, make: Callable[[], Plan]) -> None:
+    """Make the plan and the splits again that a folder lacks.
 
     Parameters
     ----------
@@ -53,12 +50,11 @@ def restore_tables(
             if table is None:
                 raise DatasetError(f"{out / name} is missing; restore it from a copy")
             _restore(out, manifest, name, table.to_csv)
-    return [name for name in lost if name != INDEX]
 
 
 def _restore(out: Path, manifest: Manifest, name: str, make: Callable[[], str]) -> None:
     text = make()
-    if hashlib.sha256(text.encode("utf-8")).hexdigest() != manifest.files[name]:
+    if sha256_text(text) != manifest.files[name]:
         raise _other_bits(out / name)
     write_text(out / name, text)
 

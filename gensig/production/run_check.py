@@ -15,10 +15,10 @@ from gensig.dataset.folder.layout import (
     read_manifest,
     shard_path,
 )
-from gensig.dataset.folder.manifest import file_digests, record_failed_shard
+from gensig.dataset.folder.manifest import file_digests, record_shards
 from gensig.dataset.folder.quick_check import absences, size_problem
 from gensig.dataset.storage.atomic import REMEDIES, cannot_write, sha256_file
-from gensig.dataset.storage.receipts import read_receipt, receipt_path
+from gensig.dataset.storage.receipts import receipt_path, shard_entries
 from gensig.errors import DatasetError, WriteError
 
 
@@ -44,18 +44,6 @@ def folder_kept(out: Path) -> Iterator[None]:
         raise WriteError(f"{error}; then `gensig resume {out}` goes on") from error
 
 
-def shard_entries(out: Path, indices: Sequence[int]) -> dict[int, ShardEntry]:
-    """Entries of shards by the manifest, and by their receipts where it has none."""
-    manifest = read_manifest(out)
-    entries = {}
-    for index in indices:
-        entry: ShardEntry | None = manifest.shards[index]
-        if manifest.shards[index].state != "done":
-            entry = read_receipt(out, index)
-        entries[index] = entry or manifest.shards[index]
-    return entries
-
-
 def lost_shards(
     out: Path, indices: Sequence[int], made: Mapping[int, str]
 ) -> list[str]:
@@ -68,14 +56,14 @@ def lost_shards(
     made : sha256 of those that this run wrote, which are read and compared
     """
     manifest, lines = read_manifest(out), []
-    for index, entry in shard_entries(out, indices).items():
+    for index, entry in shard_entries(out, manifest, indices).items():
         problem = _shard_problem(shard_path(out, index), entry, made.get(index))
         if not problem:
             continue
         lines.append(f"shard {index}: {problem}; it changed while the run was going on")
         receipt_path(out, index).unlink(missing_ok=True)
         if not manifest.is_complete and manifest.shards[index].state == "done":
-            record_failed_shard(out, index)
+            record_shards(out, {index: entry.failed()})
     return lines
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +15,7 @@ from gensig.dataset.folder.joining import joined_folder, refuse_implants
 from gensig.dataset.folder.layout import (
     PLAN,
     Manifest,
+    ShardEntry,
     shard_path,
 )
 from gensig.dataset.plan import PlanRows
@@ -40,16 +39,6 @@ from gensig.systems.base import Machine
 from gensig.units import channel_unit
 from gensig.version import __version__
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WrittenShard:
-    """Digest, size and number of failed records of a shard on disk."""
-
-    sha256: str
-    n_bytes: int
-    n_failed: int
-
-
 # records simulated and written at a time, and bytes of their samples; larger blocks are no faster
 MOST_BLOCK, BLOCK_BYTES = 16, 2**27
 # the same by the implicit method, which takes seconds a record
@@ -58,7 +47,7 @@ IMPLICIT_BLOCK = 4
 
 def write_shard(
     out: Path, shard_index: int, *, counts: RecordCounts | None = None
-) -> WrittenShard:
+) -> ShardEntry:
     """Simulate and write one shard; its bits depend only on the folder's plan and configuration.
 
     ``counts`` takes the records that are written.
@@ -68,7 +57,7 @@ def write_shard(
     DatasetError    where the folder was begun by another version than that of this process
     """
     reader, plan, manifest = _folder_inputs(out, same_file(out / PLAN))
-    sizes = [entry.rows for entry in manifest.shards]
+    sizes = manifest.shard_sizes
     n_records, begin = sizes[shard_index], sum(sizes[:shard_index])
     params = [
         name.removeprefix("params/")
@@ -92,11 +81,8 @@ def write_shard(
                 writer.write(row, record.signals, record.values)
                 if counts is not None:
                     counts.set(shard_index, row + 1)
-    written = WrittenShard(
-        sha256=writer.sha256, n_bytes=writer.n_bytes, n_failed=writer.n_failed
-    )
-    write_receipt(out, shard_index, rows=n_records, **dataclasses.asdict(written))
-    return written
+    write_receipt(out, shard_index, writer.entry)
+    return writer.entry
 
 
 @contextmanager
@@ -142,11 +128,7 @@ def _check_rows(
 
 def block_length(system: Machine) -> int:
     """Records that are simulated at a time: enough for full speed, few enough for the memory."""
-    n_bytes = (
-        8
-        * len(system.sensing.channels)
-        * round(system.operating.duration * system.sensing.sampling_rate)
-    )
+    n_bytes = 8 * len(system.sensing.channels) * system.n_samples
     most = MOST_BLOCK
     if system.solver.backend == IMPLICIT_BACKEND:
         most = IMPLICIT_BLOCK

@@ -140,21 +140,13 @@ class RecordStream:
                 protocol, f"the plan can have {', '.join(sorted(tables))}"
             )
             raise DatasetError(f"split {protocol!r} does not exist; {reason}")
-        table = tables[protocol]
         indices = {name: k for k, name in enumerate(self.column("record_id").tolist())}
         rows: dict[str, list[tuple[int, float, float]]] = {
             subset: [] for subset in SUBSETS
         }
-        windows = zip(
-            table.record_id.tolist(),
-            table.start_fraction.tolist(),
-            table.stop_fraction.tolist(),
-            table.subset.tolist(),
-            strict=True,
-        )
-        for name, start, stop, subset in windows:
+        for name, start, stop, subset in tables[protocol].rows():
             if name in indices:
-                rows[subset].append((indices[name], float(start), float(stop)))
+                rows[subset].append((indices[name], start, stop))
         return rows
 
     def take(self, records: ArrayLike) -> RecordStream:

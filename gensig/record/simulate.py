@@ -145,7 +145,7 @@ def _record(reader: InputReader, row: Row, measured: _Measured) -> Record:
     except SimulationError as error:
         record = _failed(measured, error)
     dataset, machine = measured.inputs.dataset, measured.inputs.machine
-    n_samples = _n_samples(machine)
+    n_samples = machine.n_samples
     motion, angle = None, np.full(n_samples, MISSING)
     if isinstance(measured.motion, CleanRecord):
         motion = measured.motion
@@ -211,7 +211,7 @@ def _check_speed(operating: Operating, motion: CleanRecord) -> None:
 def _failed(measured: _Measured, error: SimulationError) -> Record:
     """A record of missing samples, with the reason of its failure."""
     inputs = measured.inputs
-    sensing, n_samples = inputs.machine.sensing, _n_samples(inputs.machine)
+    sensing, n_samples = inputs.machine.sensing, inputs.machine.n_samples
     silent = np.full((len(sensing.channel_names), n_samples), MISSING)
     source = np.full((len(sensing.channels), n_samples), MISSING)
     noise_power = np.full(len(silent), MISSING)
@@ -250,14 +250,10 @@ def _samples(
     return signals
 
 
-def _n_samples(machine: Machine) -> int:
-    return round(machine.operating.duration * machine.sensing.sampling_rate)
-
-
 def signal_shapes(reader: InputReader) -> dict[str, tuple[int, ...]]:
     """Shape of every array of one record, by signal name."""
     dataset, machine = reader.dataset, reader.machine()
-    n_channels, n_samples = len(machine.sensing.channel_names), _n_samples(machine)
+    n_channels, n_samples = len(machine.sensing.channel_names), machine.n_samples
     sensors, samples = (n_channels, n_samples), (n_samples,)
     shapes: dict[str, tuple[int, ...]] = {
         "acceleration": sensors,
@@ -288,7 +284,7 @@ def _mesh_signals(machine: Machine, motion: CleanRecord | None) -> Signals:
 
     Without values for a failed record, which has no motion.
     """
-    n_samples, n_pairs = _n_samples(machine), machine.most_pairs
+    n_samples, n_pairs = machine.n_samples, machine.most_pairs
     further = [mesh for mesh in machine.meshes if not mesh.followed]
     state: MeshState | None = None
     states: Sequence[MeshState | None] = [None] * len(further)

@@ -199,17 +199,23 @@ def _groups(data: Dataset, records: NDArray[np.integer]) -> list[NDArray[np.inte
     """
     if has_lives(data):
         records = _worst_lives(data, records)
-    unit, condition = data.column("unit_id"), data.column("condition_id")
-    keys = list(zip(unit[records], condition[records], strict=True))
-    groups: dict[tuple[str, str], list[int]] = {}
-    for key, index in zip(keys, records.tolist(), strict=True):
-        groups.setdefault(key, []).append(index)
-    result = [np.array(group) for group in groups.values()]
+    result = by_condition(data, records)
     label = data.column("label_name")
     faulty = [group for group in result if np.any(label[group] != "healthy")]
     if any("healthy" in label[group] for group in faulty):
         return faulty
     return result
+
+
+def by_condition(
+    data: Dataset, records: Sequence[int] | NDArray[np.integer]
+) -> list[NDArray[np.integer]]:
+    """Records of each condition of each unit, in their order."""
+    unit, condition = data.column("unit_id"), data.column("condition_id")
+    groups: dict[tuple[str, str], list[int]] = {}
+    for index in map(int, records):
+        groups.setdefault((unit[index], condition[index]), []).append(index)
+    return list(map(np.array, groups.values()))
 
 
 def _worst_lives(data: Dataset, records: NDArray[np.integer]) -> NDArray[np.integer]:

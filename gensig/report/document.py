@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gensig.dataset.cards.card import plain
 from gensig.dataset.cards.origin import origin_of
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.dataset.storage.atomic import write_bytes
@@ -17,7 +15,13 @@ from gensig.errors import ConfigError
 from gensig.report import tables
 from gensig.report.conditions import Choice, choose
 from gensig.report.examples import usable_top
-from gensig.report.levels import VELOCITY, level_table, loudness, velocity_rms
+from gensig.report.levels import (
+    VELOCITY,
+    class_levels,
+    level_table,
+    loudness,
+    velocity_rms,
+)
 from gensig.report.measured_ranges import at_measured_rate, compare_with_measurements
 from gensig.report.packing import pack_floats
 from gensig.report.realism import Comparison
@@ -44,6 +48,7 @@ from gensig.report.values import (
     some_records,
     value_table,
 )
+from gensig.text.escaping import plain
 from gensig.text.page import (
     Charts,
     Section,
@@ -136,7 +141,7 @@ def report_text(
     sections += [
         _indicators(data, chosen, measured, content["measured"], channel_units),
         _parameters(data, content["drawn"]),
-        _comparisons(compared, channel_units),
+        tables.comparisons(compared, channel_units),
         *tables.contents(data),
         tables.splits(data),
         *tables.loading(data),
@@ -271,13 +276,11 @@ def _indicators(
     ]
     if not known:
         return Section(title="Condition indicators", text=["No record tells one."])
-    levels = level_table(data, measured, chosen.channels, units)
-    if levels is not None:
-        text += loudness(data, measured, chosen.channels, units)
+    levels = class_levels(data, measured, chosen.channels, units)
     return Section(
         title="Condition indicators",
-        text=text,
-        table=levels,
+        text=[*text, *loudness(levels)],
+        table=level_table(levels),
         charts=Charts(
             name="indicators",
             label="Choice of indicator",
@@ -311,20 +314,6 @@ def _lives(table: dict[str, Any]) -> Section:
             plots=[("lives", "Lives over time")],
         ),
     )
-
-
-def _comparisons(compared: Sequence[Comparison], units: Sequence[str]) -> Section:
-    section = tables.measured_table(compared, units)
-    if not compared:
-        return section
-    charts = Charts(
-        name="beside",
-        label="Nothing to choose",
-        plots=[("beside", "Measured ranges and this set")],
-    )
-    assert section.table is not None  # there are comparisons
-    table = replace(section.table, folded="The same as a table")
-    return replace(section, charts=charts, table=table)
 
 
 def _of(n_rows: int, data: Dataset) -> str:

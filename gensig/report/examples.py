@@ -15,6 +15,7 @@ from gensig.report.packing import pack_amplitude, pack_signal
 from gensig.report.rotation_frequencies import Rotation
 from gensig.signals.envelope import envelope_spectrum
 from gensig.signals.spectrum import amplitude_spectrum
+from gensig.text.amounts import finite
 
 FloatArray = NDArray[np.floating]
 
@@ -61,7 +62,7 @@ def example(
     """
     index = shown.index
     name, fault = str(data.column("label_name")[index]), rotation.fault_gear(index)
-    severity = _finite(data.column("severity")[index])
+    severity = finite(data.column("severity")[index])
     if shown.is_twin:
         name, fault, severity = "healthy twin", "", 0.0
     rate, top, frequencies = data.sampling_rate, usable_top(data), rotation.of(index)
@@ -71,7 +72,7 @@ def example(
         "severity": severity,
         "unit": str(data.column("unit_id")[index]),
         "condition": str(data.column("condition_id")[index]),
-        "torque": _finite(data.column("torque_nm")[index]),
+        "torque": finite(data.column("torque_nm")[index]),
         "frequencies": frequencies,
         "fault": fault,
         "views": [_views(signal, rate, top, frequencies["mesh"]) for signal in signals],
@@ -154,9 +155,3 @@ def _spectrogram(signal: FloatArray, rate: float, top: float) -> dict[str, Any]:
         "time_step": hop / rate,
         "step": rate / n_window,
     }
-
-
-def _finite(value: Any) -> float | None:
-    if np.isfinite(value):
-        return float(value)
-    return None

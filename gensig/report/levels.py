@@ -8,13 +8,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dataset.cards.card import plain
 from gensig.dataset.reader import Dataset
 from gensig.report.values import Measured
 from gensig.signals.recording import STANDARD_GRAVITY
+from gensig.text.escaping import plain
 from gensig.text.page import Table
 
 FloatArray = NDArray[np.floating]
+# class, channel, RMS in m/s^2, velocity RMS in m/s
+Level = tuple[str, str, float, float]
 
 VELOCITY = "velocity_rms"
 LEVELS = "Levels in m/s², g and mm/s, medians of each class"
@@ -65,16 +67,31 @@ def _limits(power_kw: float) -> tuple[float, ...]:
     return next(limits for power, limits in ZONE_LIMITS.items() if power_kw <= power)
 
 
-def level_table(
+def class_levels(
     data: Dataset, measured: Measured, channels: Sequence[str], units: Sequence[str]
-) -> Table | None:
-    """Medians of each class and accelerometer; None where there is no acceleration in m/s^2."""
-    rows = []
-    for name, channel, rms, velocity in _medians(data, measured, channels, units):
-        levels = (rms, rms / STANDARD_GRAVITY, 1e3 * velocity)
-        cells = [f"{level:.3g}" for level in levels]
-        rows.append((plain(name), plain(channel), *cells))
-    if not rows:
+) -> list[Level]:
+    """Medians of each class and accelerometer; empty where no acceleration is in m/s^2."""
+    label = data.column("label_name")[measured.records]
+    rms, velocity = measured.values["rms"], measured.further.get(VELOCITY)
+    if velocity is None:
+        return []
+    return [
+        (
+            plain(name),
+            plain(channel),
+            float(np.nanmedian(rms[mine, column])),
+            float(np.nanmedian(velocity[mine, column])),
+        )
+        for name in data.class_names
+        if (mine := label == name).any()
+        for column, channel in enumerate(channels)
+        if units[column] == "m/s^2"
+    ]
+
+
+def level_table(levels: Sequence[Level]) -> Table | None:
+    """Levels in three units; None where there is none."""
+    if not levels:
         return None
     head = (
         "class",
@@ -83,52 +100,30 @@ def level_table(
         "RMS, g",
         "velocity RMS 10 to 1000 Hz, mm/s",
     )
+    rows = [
+        (*names, f"{rms:.3g}", f"{rms / STANDARD_GRAVITY:.3g}", f"{1e3 * velocity:.3g}")
+        for *names, rms, velocity in levels
+    ]
     return Table(head=head, rows=rows, folded=LEVELS)
 
 
-def loudness(
-    data: Dataset, measured: Measured, channels: Sequence[str], units: Sequence[str]
-) -> list[str]:
+def loudness(levels: Sequence[Level]) -> list[str]:
     """One sentence where a level is beyond what housings of machines in service show.
 
     Empty elsewhere.
     """
-    medians = _medians(data, measured, channels, units)
     loud = [
-        row
-        for row in medians
-        if row[2] > LOUD_ACCELERATION or row[3] > HARMFUL_VELOCITY
+        name
+        for name, _, rms, velocity in levels
+        if rms > LOUD_ACCELERATION or velocity > HARMFUL_VELOCITY
     ]
     if not loud:
         return []
-    names = ", ".join(dict.fromkeys(plain(name) for name, *_ in loud))
     return [
-        f"Louder than most published housings: {names}. "
+        f"Louder than most published housings: {', '.join(dict.fromkeys(loud))}. "
         f"Above {LOUD_ACCELERATION / STANDARD_GRAVITY:g} g, "
         f"or above {1e3 * HARMFUL_VELOCITY:g} mm/s, from which ISO 20816-3 expects damage "
         "of large machines on flexible supports. Compare shapes and ratios between "
         "classes with measurements, not levels; noise is relative to the signal, so that "
         "it is as loud."
-    ]
-
-
-def _medians(
-    data: Dataset, measured: Measured, channels: Sequence[str], units: Sequence[str]
-) -> list[tuple[str, str, float, float]]:
-    """(class, channel, RMS in m/s^2, velocity in m/s), those that are known."""
-    label = data.column("label_name")[measured.records]
-    rms, velocity = measured.values["rms"], measured.further.get(VELOCITY)
-    if velocity is None:
-        return []
-    return [
-        (
-            name,
-            channel,
-            float(np.nanmedian(rms[mine, column])),
-            float(np.nanmedian(velocity[mine, column])),
-        )
-        for name in data.class_names
-        if (mine := label == name).any()
-        for column, channel in enumerate(channels)
-        if units[column] == "m/s^2"
     ]

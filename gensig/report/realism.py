@@ -1,17 +1,15 @@
-"""Simulated records beside measured ranges: how they are judged, stored and shown.
+"""Simulated records beside measured ranges: how they are judged and shown.
 
 ``realism_ranges.csv`` holds the published ranges: ``id``, ``at`` (which conditions), ``unit``,
 ``low``, ``high`` (empty: open; both empty: shown without a range) and ``source``.
-``realism_results.csv`` holds what ``python -m benchmarks.realism --stored`` found; its first line
-says what was compared, and which commit froze the simulation before. The column ``reason`` is
-written by hand and kept by later runs.
+``realism_results.csv`` holds what ``python -m benchmarks.realism --stored`` found.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gensig.errors import ConfigError
-from gensig.text.csv_tables import read_records, write_rows
+from gensig.text.csv_tables import read_records
 
 FOLDER = Path(__file__).resolve().parent
-RANGES, RESULTS = FOLDER / "realism_ranges.csv", FOLDER / "realism_results.csv"
+RANGES = FOLDER / "realism_ranges.csv"
 INSIDE, OVERLAPS, MISSES, WITHOUT, NOTHING = (
     "inside",
     "overlaps",
@@ -32,7 +30,6 @@ INSIDE, OVERLAPS, MISSES, WITHOUT, NOTHING = (
 )
 APART, NOT_APART = "told apart", "not told apart"
 VERDICTS = (INSIDE, OVERLAPS, MISSES, WITHOUT, NOTHING, APART, NOT_APART)
-RECORDING = "recording"  # ids that begin so belong to the second table
 
 RangeKey = tuple[str, str]  # id, at
 
@@ -83,19 +80,6 @@ class Comparison(Range):
         return self.id, self.at
 
 
-COLUMNS = (
-    "quantity",
-    "at",
-    "beside",
-    "median",
-    "5 to 95 %",
-    "values",
-    "verdict",
-    "source",
-    "reason",
-)
-
-
 def judge(low: float | None, high: float | None, p5: float, p95: float) -> str:
     """Verdict on a central 90 %: inside the range, overlapping it, or missing it."""
     if math.isnan(p5) or math.isnan(p95):
@@ -133,43 +117,18 @@ def compare(measured: Range, values: ArrayLike) -> Comparison:
 def read_ranges(path: Path = RANGES) -> dict[RangeKey, Range]:
     """The measured ranges, by id and conditions, in the order of the file."""
     with path.open(encoding="utf-8", newline="") as file:
-        rows = [Range(**_read(line, ("low", "high"))) for line in read_records(file)]
+        rows = [
+            Range(**with_numbers(line, ("low", "high"))) for line in read_records(file)
+        ]
     return {(row.id, row.at): row for row in rows}
 
 
-def write_results(path: Path, heading: str, rows: Sequence[Comparison]) -> None:
-    """Store comparisons below a heading of one line; reasons of a former file stay."""
-    reasons: dict[RangeKey, str] = {}
-    if path.exists():
-        reasons = {row.key: row.reason for row in read_results(path)[1]}
-    names = [field.name for field in fields(Comparison)]
-    with path.open("w", encoding="utf-8", newline="") as file:
-        file.write(f"# {' '.join(heading.split())}\n")
-        write_rows(file, [names])
-        for row in rows:
-            reason = row.reason or reasons.get(row.key, "")
-            values = asdict(replace(row, reason=reason))
-            write_rows(file, [list(map(_written, values.values()))])
-
-
-def read_results(path: Path = RESULTS) -> tuple[str, list[Comparison]]:
-    """The heading and the comparisons of a stored file.
-
-    Raises
-    ------
-    ConfigError    for a file without its heading, or a row with an unknown verdict
-    """
-    lines = path.read_text(encoding="utf-8").splitlines()
-    if not lines or not lines[0].startswith("# "):
-        raise ConfigError(
-            f"{path.name} must begin with a line '# ' that says what was compared; make it again"
-        )
-    numbers = ("low", "high", "median", "p5", "p95")
-    rows = []
-    for line in read_records(lines[1:]):
-        values = _read(line, numbers)
-        rows.append(Comparison(**{**values, "n": int(line["n"])}))
-    return lines[0][2:], rows
+def with_numbers(line: Mapping[str, str], numbers: Sequence[str]) -> dict[str, Any]:
+    """A line of a file; empty cells of number columns are None."""
+    values: dict[str, Any] = dict(line)
+    for name in numbers:
+        values[name] = float(line[name]) if line[name] else None
+    return values
 
 
 def shown_range(measured: Range) -> str:
@@ -184,38 +143,6 @@ def shown_range(measured: Range) -> str:
     return f"{low:.3g} to {high:.3g}"
 
 
-def _written(value: Any) -> Any:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    return "" if value is None else value
-
-
-def _read(line: Mapping[str, str], numbers: Sequence[str]) -> dict[str, Any]:
-    """A line of a file; empty cells of number columns are None."""
-    values: dict[str, Any] = dict(line)
-    for name in numbers:
-        values[name] = float(line[name]) if line[name] else None
-    return values
-
-
-def table(rows: Sequence[Comparison]) -> list[str]:
-    """Comparisons as lines of a Markdown table."""
-    lines = [f"| {' | '.join(COLUMNS)} |", "|---" * len(COLUMNS) + "|"]
-    for row in rows:
-        cells = (
-            f"{row.id}, {row.unit}".rstrip(", "),
-            row.at,
-            shown_range(row),
-            _number(row.median),
-            f"{_number(row.p5)} to {_number(row.p95)}",
-            str(row.n),
-            row.verdict,
-            row.source,
-            row.reason,
-        )
-        lines.append(f"| {' | '.join(cells)} |")
-    return lines
-
-
-def _number(value: float) -> str:
+def number_text(value: float) -> str:
+    """Three digits; 'none' for NaN."""
     return "none" if math.isnan(value) else f"{value:.3g}"

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dataset.cards.card import plain
 from gensig.dataset.reader import Dataset
-from gensig.report.conditions import TWIN, Healthy, Shown, healthy_beside
+from gensig.report.conditions import (
+    TWIN,
+    Healthy,
+    Shown,
+    by_condition,
+    healthy_beside,
+)
 from gensig.report.examples import read_signals
 from gensig.report.packing import pack_signal
 from gensig.report.rotation_frequencies import Rotation
-from gensig.report.signal_views import BESIDE, turn_view
+from gensig.report.signal_views import BESIDE, faulty_tooth, turn_view
 from gensig.report.turns import aligned, averaged_turn, conspicuity, gear_teeth
+from gensig.text.escaping import plain
 from gensig.text.parameters import size_words
 
 IntArray = NDArray[np.integer]
@@ -108,18 +114,12 @@ def _stepped(data: Dataset, records: IntArray) -> IntArray:
     """Records to step through in the order of severity; empty where there is no sweep."""
     severity = data.column("severity")
     records = records[np.isfinite(severity[records])]
-    unit, condition = data.column("unit_id"), data.column("condition_id")
-    keys = list(zip(unit[records], condition[records], strict=True))
-    groups: dict[tuple[str, str], list[int]] = {}
-    for key, index in zip(keys, records.tolist(), strict=True):
-        if step_healthy(data, index) is not None:
-            groups.setdefault(key, []).append(index)
-    of_condition = [np.array(group, dtype=int) for group in groups.values()]
+    beside = [k for k in records.tolist() if step_healthy(data, k) is not None]
 
     def n_severities(group: IntArray) -> int:
         return len(np.unique(severity[group]))
 
-    chosen = max(of_condition, key=n_severities, default=records[:0])
+    chosen = max(by_condition(data, beside), key=n_severities, default=records[:0])
     if n_severities(chosen) < LEAST_SEVERITIES and TWIN in data.signal_names:
         chosen = records
     if n_severities(chosen) < LEAST_SEVERITIES:
@@ -131,7 +131,7 @@ def _stepped(data: Dataset, records: IntArray) -> IntArray:
 def _thinned(sweep: Sweep, most: int) -> Sweep:
     ranks = np.linspace(0, sweep.records.size - 1, min(most, sweep.records.size))
     kept = sweep.records[np.rint(ranks).astype(int)]
-    return Sweep(name=sweep.name, gear=sweep.gear, records=kept, size=sweep.size)
+    return replace(sweep, records=kept)
 
 
 def _size(data: Dataset, records: IntArray) -> str:
@@ -166,12 +166,10 @@ def _step(
         "severity": severity,
         "label": _label(data, sweep, index),
         "beside": "",
-        "tooth": None,
+        "tooth": faulty_tooth(data, shown[0]),
         "turns": [],
         "change": None,
     }
-    if "fault_tooth" in data.column_names and data.column("fault_tooth")[index] >= 0:
-        step["tooth"] = int(data.column("fault_tooth")[index])
     if healthy is None:
         return step
     step["beside"] = BESIDE[healthy.kind]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from gensig.dataset.cards.card import plain
 from gensig.dataset.reader import Dataset
 from gensig.report.conditions import Choice
 from gensig.report.examples import envelope_band
@@ -13,6 +12,7 @@ from gensig.report.rotation_frequencies import Rotation
 from gensig.report.signal_views import first_channel
 from gensig.report.sound import SOUND_RATE, SOUND_SECONDS
 from gensig.report.turns import FINE_TEETH
+from gensig.text.escaping import plain
 from gensig.text.page import Charts, Section, Select, Slider, Switch
 
 MARKS = (

@@ -159,7 +159,7 @@ def _views_of(
             "beside": words,
             "turned": gear,
             "turns": _turn_views(data, read, rotation, at),
-            "tooth": _faulty_tooth(data, shown),
+            "tooth": faulty_tooth(data, shown),
             "sound": files[at],
             "conspicuity": None,
         }
@@ -180,7 +180,7 @@ def _turned_gear(data: Dataset, read: _Read, shown: Shown) -> str:
     return next(iter(gears), "")
 
 
-def _faulty_tooth(data: Dataset, shown: Shown) -> int | None:
+def faulty_tooth(data: Dataset, shown: Shown) -> int | None:
     """Number of a record's faulty tooth, None without one."""
     if shown.is_twin or "fault_tooth" not in data.column_names:
         return None

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
 
-from gensig.dataset.cards.card import (
-    caveats_of,
-    plain,
-    torque_words,
+from gensig.dataset.cards.card import caveats_of
+from gensig.dataset.cards.facts import (
+    geometry_facts,
+    rounded,
+    running_facts,
+    value_range,
 )
-from gensig.dataset.cards.facts import geometry_facts, rounded, value_range
 from gensig.dataset.folder.layout import CONFIG, CONFIG_BYTES_LIMIT, OVERRIDES
 from gensig.dataset.reader import Dataset
 from gensig.dataset.splitting.dealing import GROUP_NAMES
 from gensig.dataset.splitting.protocols import PROTOCOLS
 from gensig.dataset.storage.atomic import read_text
-from gensig.report.realism import Comparison, shown_range
-from gensig.text.page import Section, Table
+from gensig.report.realism import Comparison, number_text, shown_range
+from gensig.text.escaping import plain
+from gensig.text.page import Charts, Section, Table
 
 MANY_SHARDS = 200
 IN_WORDS = {
@@ -69,21 +70,7 @@ def contents(data: Dataset) -> list[Section]:
         (IN_WORDS.get(name, name), _shown(value))
         for name, value in geometry_facts(data).items()
     ]
-    counted = {
-        "machines": "unit_id",
-        "sets of gears": "specimen_id",
-        "gearboxes": "gearbox_id",
-    }
-    rows += [
-        (name, f"{len(np.unique(data.column(column)))}")
-        for name, column in counted.items()
-    ]
-    rows += [
-        ("speed of the driving shaft", value_range(data.column("speed_rpm"), "r/min")),
-        (torque_words(data), value_range(data.column("torque_nm"), "N m")),
-    ]
-    if "snr_db" in data.column_names:
-        rows.append(("signal-to-noise ratio", value_range(data.column("snr_db"), "dB")))
+    rows += [(name, f"{value}") for name, value in running_facts(data).items()]
     if "life_id" in data.column_names:
         n_lives = len(np.unique(data.column("life_id")))
         rows.append(("lives", f"{n_lives}, to failure or to the horizon"))
@@ -158,8 +145,8 @@ def splits(data: Dataset) -> Section:
     return Section(title="Splits", text=text, table=table, notes=left_out, folded=True)
 
 
-def measured_table(compared: Sequence[Comparison], units: Sequence[str]) -> Section:
-    """Values of the set with measured ranges, or the reason why there are none."""
+def comparisons(compared: Sequence[Comparison], units: Sequence[str]) -> Section:
+    """Values of the set beside measured ranges, or the reason why there are none."""
     text = [
         "Central 90 % of this set's values beside ranges of published recordings of a "
         "two-stage parallel spur gearbox (5 kHz, one set of gears a class), which is another "
@@ -178,9 +165,9 @@ def measured_table(compared: Sequence[Comparison], units: Sequence[str]) -> Sect
             item.id,
             item.at,
             shown_range(item),
-            _number(item.median),
-            f"{_number(item.p5)} to {_number(item.p95)}",
-            f"{item.n}",
+            number_text(item.median),
+            f"{number_text(item.p5)} to {number_text(item.p95)}",
+            item.n,
             item.verdict,
         )
         for item in compared
@@ -195,7 +182,14 @@ def measured_table(compared: Sequence[Comparison], units: Sequence[str]) -> Sect
         "verdict",
     )
     return Section(
-        title="Beside measurements", text=text, table=Table(head=head, rows=rows)
+        title="Beside measurements",
+        text=text,
+        charts=Charts(
+            name="beside",
+            label="Nothing to choose",
+            plots=[("beside", "Measured ranges and this set")],
+        ),
+        table=Table(head=head, rows=rows, folded="The same as a table"),
     )
 
 
@@ -264,13 +258,10 @@ def loading(data: Dataset) -> list[Section]:
             "  # [(record, start_fraction, stop_fraction), ...]"
         )
     text = ["Every shard is plain HDF5 too: h5py, MATLAB and Octave read it."]
-    caveats = [
-        " ".join(line.replace("`", "").split())
-        for line in caveats_of(data).removeprefix("- ").split("\n- ")
-    ]
+    caveats = [("", caveat.replace("`", "")) for caveat in caveats_of(data)]
     return [
         Section(title="Load it", text=text, code="\n".join(code)),
-        Section(title="What to mind", notes=[("", line) for line in caveats]),
+        Section(title="What to mind", notes=caveats),
     ]
 
 
@@ -291,9 +282,3 @@ def _compact(value: object) -> str:
     if isinstance(value, (int, float)):
         return f"{value:g}"
     return plain(value)
-
-
-def _number(value: float) -> str:
-    if math.isnan(value):
-        return "none"
-    return f"{value:.3g}"

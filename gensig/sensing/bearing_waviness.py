@@ -12,15 +12,12 @@ from gensig.dynamics.response import LinearMachine
 from gensig.errors import ConfigError
 from gensig.sensing.tones import (
     MOST_HARMONICS,
-    TURN,
+    Draws,
     Limits,
     Nuisance,
     Tones,
     fixed,
-    logarithmic,
-    make_tones,
     turning,
-    uniform,
 )
 from gensig.units import unit
 
@@ -97,22 +94,17 @@ class Bearing(Nuisance):
                 f"do not fit on pitch_diameter_mm = {1e3 * self.pitch_diameter:g}"
             )
 
-    def draw(
-        self,
-        unit_rng: np.random.Generator,
-        record_rng: np.random.Generator,
-        machine: LinearMachine,
-    ) -> Tones:
+    def draw(self, of_unit: Draws, of_record: Draws, machine: LinearMachine) -> Tones:
         """As ``Nuisance.draw``."""
         n = self.n_balls
         outer, inner, ball, cage = (
-            logarithmic(unit_rng, self.waviness) for _ in range(4)
+            of_unit.logarithmic(self.waviness) for _ in range(4)
         )
-        along = fixed(TURN * unit_rng.random())
+        along = fixed(of_unit.angle())
         # as many draws whatever n_harmonics is
-        phases = TURN * unit_rng.random((5, MOST_HARMONICS))
-        slip = uniform(record_rng, self.slip)
-        cage_angle, ball_angle = TURN * record_rng.random(2)
+        phases = of_unit.angles(5, MOST_HARMONICS)
+        slip = of_record.uniform(self.slip)
+        cage_angle, ball_angle = of_record.angles(2)
         orders = bearing_orders(
             n, self.ball_diameter, self.pitch_diameter, self.contact_angle, slip
         )
@@ -141,8 +133,7 @@ class Bearing(Nuisance):
         )
         support = turned.body.support
         stiffness = np.array([support.stiffness_x, support.stiffness_y, 0.0])
-        return make_tones(
-            self.gear,
+        return self.tones(
             [1.0, orders.cage, orders.ball],
             multiples,
             begin[:, None] * forces * stiffness,

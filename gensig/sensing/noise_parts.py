@@ -117,7 +117,7 @@ class Hum(Part):
     Harmonic k has the amplitude 1 / k (assumed) and a separate phase in each sensor.
     """
 
-    is_broad: ClassVar[bool] = False
+    is_broad = False
     mains: float = unit("hz")
     n_harmonics: int
 
@@ -165,7 +165,7 @@ class Machine(Part):
     Tones above the usable band are left out.
     """
 
-    is_broad: ClassVar[bool] = False
+    is_broad = False
     limits: ClassVar[Limits] = {"frequency_scatter": (0.0, 0.5)}
     shaft: float = unit("hz")
     frequency_scatter: float

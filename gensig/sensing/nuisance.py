@@ -18,14 +18,12 @@ from gensig.sensing.bearing_waviness import Bearing
 from gensig.sensing.tones import (
     MOST_HARMONICS,
     TURN,
+    Draws,
     Limits,
     Nuisance,
     Tones,
     fixed,
-    logarithmic,
-    make_tones,
     turning,
-    uniform,
 )
 from gensig.units import read_kind, to_si, unit
 
@@ -42,7 +40,7 @@ class Unbalance(Nuisance):
     Source: ISO 21940-11, 4.4: e w = G mm/s at the highest speed of service; the force is m e w^2.
     """
 
-    level: ClassVar[str] = "specimen"
+    level = "specimen"
     iso21940_grade: float
     used_share: tuple[float, ...]
     rated_speed: float = unit("rpm")
@@ -55,14 +53,9 @@ class Unbalance(Nuisance):
     }
     ranges: ClassVar[Limits] = {"used_share": (0.0, 1.0)}
 
-    def draw(
-        self,
-        unit_rng: np.random.Generator,
-        record_rng: np.random.Generator,
-        machine: LinearMachine,
-    ) -> Tones:
+    def draw(self, of_unit: Draws, of_record: Draws, machine: LinearMachine) -> Tones:
         """As ``Nuisance.draw``."""
-        share, angle = uniform(unit_rng, self.used_share), TURN * unit_rng.random()
+        share, angle = of_unit.uniform(self.used_share), of_unit.angle()
         turned = machine.shaft(self.gear)
         eccentricity = (
             share * 1e-3 * self.iso21940_grade / (self.rated_speed * turned.set_ratio)
@@ -72,7 +65,7 @@ class Unbalance(Nuisance):
             mass = turned.body.mass
         force = mass * eccentricity * turned.speed**2
         rotating = np.exp(1j * angle) * force * turning(turned.sense)
-        return make_tones(self.gear, [1.0], [[1]], [rotating], "speed_squared")
+        return self.tones([1.0], [[1]], [rotating], "speed_squared")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +84,6 @@ class CouplingMisalignment(Nuisance):
     order_shares: tuple[float, ...]
     torque_share: tuple[float, ...]
 
-    limits: ClassVar[Limits] = {}
     ranges: ClassVar[Limits] = {"force_share": (1e-6, 1.0), "torque_share": (0.0, 1.0)}
 
     def __post_init__(self) -> None:
@@ -104,29 +96,22 @@ class CouplingMisalignment(Nuisance):
             if not 0.0 <= share <= 100.0:
                 raise ConfigError(f"order_shares = {share:g} must lie in 0..100")
 
-    def draw(
-        self,
-        unit_rng: np.random.Generator,
-        record_rng: np.random.Generator,
-        machine: LinearMachine,
-    ) -> Tones:
+    def draw(self, of_unit: Draws, of_record: Draws, machine: LinearMachine) -> Tones:
         """As ``Nuisance.draw``."""
         turned = machine.shaft(self.gear)
-        radial = logarithmic(unit_rng, self.force_share) * turned.mesh_force
-        torque = uniform(unit_rng, self.torque_share)
+        radial = of_unit.logarithmic(self.force_share) * turned.mesh_force
+        torque = of_unit.uniform(self.torque_share)
         torque *= turned.torque
-        along = fixed(TURN * unit_rng.random())
+        along = fixed(of_unit.angle())
         twist = np.array([0.0, 0.0, 1.0])
-        twisting = torque * np.exp(1j * TURN * unit_rng.random()) * twist
-        phases = np.exp(1j * TURN * unit_rng.random(len(self.order_shares)))
+        twisting = torque * np.exp(1j * of_unit.angle()) * twist
+        phases = np.exp(1j * of_unit.angles(len(self.order_shares)))
         forces = [
             radial * share * phase * along
             for share, phase in zip(self.order_shares, phases, strict=True)
         ]
         orders = [[k + 1] for k in range(len(forces))]
-        return make_tones(
-            self.gear, [1.0], [[2], *orders], [twisting, *forces], "torque"
-        )
+        return self.tones([1.0], [[2], *orders], [twisting, *forces], "torque")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,24 +137,19 @@ class Looseness(Nuisance):
     }
     ranges: ClassVar[Limits] = {"force_share": (1e-6, 1.0), "half_share": (0.0, 1.0)}
 
-    def draw(
-        self,
-        unit_rng: np.random.Generator,
-        record_rng: np.random.Generator,
-        machine: LinearMachine,
-    ) -> Tones:
+    def draw(self, of_unit: Draws, of_record: Draws, machine: LinearMachine) -> Tones:
         """As ``Nuisance.draw``."""
         mesh_force = machine.shaft(self.gear).mesh_force
-        level = logarithmic(unit_rng, self.force_share) * mesh_force
-        half_share = uniform(unit_rng, self.half_share)
-        along = fixed(TURN * unit_rng.random())
+        level = of_unit.logarithmic(self.force_share) * mesh_force
+        half_share = of_unit.uniform(self.half_share)
+        along = fixed(of_unit.angle())
         halves = np.arange(1, 2 * self.n_orders + 1)
         size = np.maximum(0.5 * halves, 1.0) ** -self.harmonic_exponent
         size *= np.where(halves % 2 == 1, half_share, 1.0)
-        second_turn = math.pi * halves * int(record_rng.integers(2))
-        phase = np.exp(1j * (TURN * unit_rng.random(len(halves)) + second_turn))
+        second_turn = math.pi * halves * int(of_record.rng.integers(2))
+        phase = np.exp(1j * (of_unit.angles(len(halves)) + second_turn))
         force = level * (size * phase)[:, None] * along
-        return make_tones(self.gear, [0.5], halves[:, None], force, "torque")
+        return self.tones([0.5], halves[:, None], force, "torque")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -205,20 +185,15 @@ class NeighbourMesh(Nuisance):
         "sideband_share": (0.0, 1.0),
     }
 
-    def draw(
-        self,
-        unit_rng: np.random.Generator,
-        record_rng: np.random.Generator,
-        machine: LinearMachine,
-    ) -> Tones:
+    def draw(self, of_unit: Draws, of_record: Draws, machine: LinearMachine) -> Tones:
         """As ``Nuisance.draw``."""
         turned = machine.shaft(self.gear)
-        level = logarithmic(unit_rng, self.dynamic_share)
+        level = of_unit.logarithmic(self.dynamic_share)
         level *= turned.torque
         level /= self.base_radius
-        sideband = uniform(unit_rng, self.sideband_share)
-        phases = TURN * unit_rng.random((5, MOST_HARMONICS))
-        mate_angle = TURN * record_rng.random()
+        sideband = of_unit.uniform(self.sideband_share)
+        phases = of_unit.angles(5, MOST_HARMONICS)
+        mate_angle = of_record.angle()
         along = fixed(self.line_of_action)
         # the next stage's force holds the shaft of a driven gear back, that of the stage before
         # drives the shaft of a driving one
@@ -234,8 +209,8 @@ class NeighbourMesh(Nuisance):
         phase = phases[:, : self.n_harmonics] + offsets[:, 1, None] * mate_angle
         force = level * (size * np.exp(1j * phase))[:, :, None] * along
         orders = [1.0, self.n_teeth / self.n_teeth_mate]
-        return make_tones(
-            self.gear, orders, multiples.reshape(-1, 2), force.reshape(-1, 3), "torque"
+        return self.tones(
+            orders, multiples.reshape(-1, 2), force.reshape(-1, 3), "torque"
         )
 
 
@@ -275,6 +250,6 @@ def draw_tones(
     of_units = {level: rng.spawn(count) for level, rng in units.items()}
     of_record = record_rng.spawn(count)
     return [
-        part.draw(of_units[part.level][index], of_record[index], machine)
+        part.draw(Draws(of_units[part.level][index]), Draws(of_record[index]), machine)
         for index, part in enumerate(nuisances)
     ]

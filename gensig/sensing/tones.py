@@ -44,6 +44,29 @@ class Tones:
         return np.asarray(self.multiple @ self.base)
 
 
+@dataclass(frozen=True, slots=True)
+class Draws:
+    """Random numbers of one part, from a generator of its own; ``ends`` are [low, high]."""
+
+    rng: np.random.Generator
+
+    def uniform(self, ends: tuple[float, ...]) -> float:
+        """One number between two ends."""
+        return float(self.rng.uniform(ends[0], ends[1]))
+
+    def logarithmic(self, ends: tuple[float, ...]) -> float:
+        """One number between two ends, uniform in its logarithm."""
+        return math.exp(self.rng.uniform(math.log(ends[0]), math.log(ends[1])))
+
+    def angle(self) -> float:
+        """One angle of a turn, rad."""
+        return TURN * self.rng.random()
+
+    def angles(self, *shape: int) -> Array:
+        """Angles of a turn, rad."""
+        return TURN * self.rng.random(shape)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Nuisance(ABC):
     """One cause of vibration at the shaft of one gear of the machine, ``gear`` its name.
@@ -54,7 +77,7 @@ class Nuisance(ABC):
     """
 
     level: ClassVar[str] = "gearbox"
-    limits: ClassVar[Limits]
+    limits: ClassVar[Limits] = {}
     ranges: ClassVar[Limits]
     gear: str
 
@@ -63,26 +86,20 @@ class Nuisance(ABC):
         check_ranges(self, "", **self.ranges)
 
     @abstractmethod
-    def draw(
-        self,
-        unit_rng: np.random.Generator,
-        record_rng: np.random.Generator,
-        machine: LinearMachine,
-    ) -> Tones:
+    def draw(self, of_unit: Draws, of_record: Draws, machine: LinearMachine) -> Tones:
         """Forces of one unit, with the angles that differ between its records."""
 
-
-def make_tones(
-    gear: str, base: list[float], multiple: Any, force: Any, follows: str
-) -> Tones:
-    """Tones of lists or arrays."""
-    return Tones(
-        gear=gear,
-        base=np.array(base),
-        multiple=np.array(multiple, dtype=np.int64),
-        force=np.array(force, dtype=np.complex128),
-        follows=follows,
-    )
+    def tones(
+        self, base: list[float], multiple: Any, force: Any, follows: str
+    ) -> Tones:
+        """Tones on this gear, of lists or arrays."""
+        return Tones(
+            gear=self.gear,
+            base=np.array(base),
+            multiple=np.array(multiple, dtype=np.int64),
+            force=np.array(force, dtype=np.complex128),
+            follows=follows,
+        )
 
 
 def turning(sense: float) -> Complex:
@@ -96,13 +113,3 @@ def turning(sense: float) -> Complex:
 def fixed(angle: float) -> Array:
     """Unit force in a fixed direction, from x towards y."""
     return np.array([math.cos(angle), math.sin(angle), 0.0])
-
-
-def uniform(rng: np.random.Generator, ends: tuple[float, ...]) -> float:
-    """One number between two ends."""
-    return float(rng.uniform(ends[0], ends[1]))
-
-
-def logarithmic(rng: np.random.Generator, ends: tuple[float, ...]) -> float:
-    """One number between two ends, uniform in its logarithm."""
-    return math.exp(rng.uniform(math.log(ends[0]), math.log(ends[1])))

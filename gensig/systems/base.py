@@ -107,6 +107,11 @@ class Machine(ABC):
     solver: Solver
 
     @property
+    def n_samples(self) -> int:
+        """Samples of one channel of a record."""
+        return round(self.operating.duration * self.sensing.sampling_rate)
+
+    @property
     @abstractmethod
     def pair(self) -> GearPair:
         """Geometry of the mesh that records follow."""

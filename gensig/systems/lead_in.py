@@ -40,8 +40,7 @@ def earlier(run: Run[Machine]) -> Run[Machine]:
     turned = operating.speed * float(operating.time_at_set_speed(np.array([-lead]))[0])
     pitches = start.phase + turned * pair.pinion.n_teeth / (2.0 * math.pi)
     teeth = math.floor(pitches)
-    n_samples = round(operating.duration * rate) + n_lead
-    longer = operating.earlier(lead, n_samples / rate)
+    longer = operating.earlier(lead, (run.system.n_samples + n_lead) / rate)
     line_angle = run.system.line_angle(start)
     if line_angle is not None:
         line_angle += turned / run.system.ratio

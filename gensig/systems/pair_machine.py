@@ -38,7 +38,7 @@ from gensig.mesh.thermal.paper_growth import PaperGrowth
 from gensig.mesh.tooth_table import ToothTable
 from gensig.sensing.encoder import Disc
 from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
-from gensig.systems.base import Machine, MachineMesh, simulate_together, specimen_table
+from gensig.systems.base import Machine, MachineMesh, specimen_table
 from gensig.systems.integration_checks import (
     check_steps,
 )
@@ -53,18 +53,6 @@ from gensig.systems.stiffness_curves import (
 from gensig.systems.supports import in_gearbox
 
 Array = NDArray[np.float64]
-
-
-__all__ = [
-    "CleanRecord",
-    "GearPairMachine",
-    "Machine",
-    "Run",
-    "Start",
-    "running_pair",
-    "severity",
-    "simulate_together",
-]
 
 
 @final

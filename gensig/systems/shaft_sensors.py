@@ -39,9 +39,11 @@ def shaft_signals(
     record_rng : for the jitter
     """
     sensing = system.sensing
-    n_samples = round(system.operating.duration * sensing.sampling_rate)
     if record is None or not names:
-        return {name: np.full(n_samples, np.nan).astype(_type(name)) for name in names}
+        return {
+            name: np.full(system.n_samples, np.nan).astype(_type(name))
+            for name in names
+        }
     # drawn in any case: the choice of stored signals must not change other draws
     mark = draw_mark(gearbox_rng)
     signals = {"shaft_angle": record.shaft_angle}

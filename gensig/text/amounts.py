@@ -1,7 +1,8 @@
-"""Sizes and durations as people read them, counts as people type them."""
+"""Sizes and durations as people read them, counts as people type them, numbers as JSON has them."""
 
 from __future__ import annotations
 
+import math
 import re
 
 SIZE_UNITS = ("B", "kB", "MB", "GB", "TB", "PB")
@@ -29,6 +30,11 @@ def duration_text(seconds: float) -> str:
     if rest < DAY:
         return f"{rest // HOUR} h {rest % HOUR // MINUTE} min"
     return f"{rest // DAY} d {rest % DAY // HOUR} h"
+
+
+def finite(value: float) -> float | None:
+    """A number that JSON can hold; None for one that is not finite."""
+    return float(value) if math.isfinite(value) else None
 
 
 def typed_count(text: str) -> int | None:

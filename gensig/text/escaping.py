@@ -41,6 +41,11 @@ def one_line(text: str) -> str:
     return " ".join(escaped(part) for part in re.split("[ \n]+", text.strip(" \n")))
 
 
+def plain(value: object) -> str:
+    """Text of one line for a page: every character that is not printable is a space."""
+    return "".join(c if c.isprintable() else " " for c in str(value))
+
+
 def set_warning_lines(program: str) -> None:
     """Let Python print a warning of this process as one line, `escaped`, as in a worker process."""
 

@@ -21,7 +21,7 @@ GENERATOR_BYTES = 1000  # of a page, within which its generator is named
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """Cells of plain text under a head; `quiet` rows are set in grey.
+    """Cells, shown as plain text, under a head; `quiet` rows are set in grey.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Table:
     """
 
     head: Sequence[str]
-    rows: Sequence[Sequence[str]]
+    rows: Sequence[Sequence[object]]
     quiet: Sequence[int] = ()
     folded: str = ""
 

@@ -6,21 +6,20 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from gensig.text.markdown import page_text
+from gensig.text.page import Section, Table
 from gensig.twin.check import EXPECTED, INDICATOR_UNITS, INDICATORS, N_RECORDS, Check
 from gensig.twin.fitting import Fit
 
-UNKNOWN = """## What healthy data cannot tell
-
-How a fault of this machine sounds: faults follow from the model and the geometry above, not from
-the recording. The load, the stiffness of teeth and bearings, backlash, and tip relief: they are
-given or assumed, and what they do wrong the fitted path and grade make up for at this speed and
-load only. The path begins at one bearing, along the line of action; what reaches the sensors by
-other ways is in it. Below half the mesh frequency everything that the model lacks is counted as
-noise. The grade is the one whose sidebands are as strong: eccentricity, couplings and load that
-varies make it look coarser.
-"""
-
-
+UNKNOWN = (
+    "How a fault of this machine sounds: faults follow from the model and the geometry above, not "
+    "from the recording. The load, the stiffness of teeth and bearings, backlash, and tip relief: "
+    "they are given or assumed, and what they do wrong the fitted path and grade make up for at "
+    "this speed and load only. The path begins at one bearing, along the line of action; what "
+    "reaches the sensors by other ways is in it. Below half the mesh frequency everything that the "
+    "model lacks is counted as noise. The grade is the one whose sidebands are as strong: "
+    "eccentricity, couplings and load that varies make it look coarser."
+)
 VERDICTS = {True: "agrees", False: "NO"}
 
 
@@ -69,17 +68,9 @@ def fitted_rows(fitted: Fit, n_driving: int) -> list[tuple[str, str]]:
     ]
 
 
-def check_lines(check: Check) -> list[str]:
-    """The held-out check as lines of a Markdown table, sensor by sensor."""
-    names = [
-        "sensor",
-        "bands within",
-        "median difference",
-        "largest",
-        "machine against itself",
-        *INDICATORS,
-    ]
-    lines = ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
+def check_table(check: Check) -> Table:
+    """The held-out check, sensor by sensor."""
+    rows = []
     itself = np.median(np.abs(check.fitted_db - check.measured_db), axis=1)
     for index, sensor in enumerate(check.sensors):
         size = np.abs(check.difference_db[index])
@@ -92,13 +83,19 @@ def check_lines(check: Check) -> list[str]:
         ]
         for number, unit in enumerate(INDICATOR_UNITS):
             twin = check.twin[:, index, number]
+            value = f"{check.measured[index, number]:.2f} {unit}".strip()
             word = VERDICTS[bool(check.agrees[index, number])]
-            cells.append(
-                f"{check.measured[index, number]:.2f} {unit} in "
-                f"{twin.min():.2f}..{twin.max():.2f}: {word}"
-            )
-        lines.append("| " + " | ".join(" ".join(cell.split()) for cell in cells) + " |")
-    return lines
+            cells.append(f"{value} in {twin.min():.2f}..{twin.max():.2f}: {word}")
+        rows.append(cells)
+    head = (
+        "sensor",
+        "bands within",
+        "median difference",
+        "largest",
+        "machine against itself",
+        *INDICATORS,
+    )
+    return Table(head=head, rows=rows)
 
 
 def check_summary(check: Check) -> list[str]:
@@ -143,42 +140,31 @@ def report_text(
     words: Sequence[str],
 ) -> str:
     """The report in Markdown."""
-    rows = "\n".join(
-        f"| {key} | {value} |" for key, value in fitted_rows(fitted, n_driving)
+    found = Table(head=("what", "value"), rows=fitted_rows(fitted, n_driving))
+    given = Table(head=("key", "where it is from"), rows=[*assumed.items()])
+    how = (
+        f"{held_out}, {check.duration:.3g} s, and {N_RECORDS} healthy records of the twin, each of "
+        "another set of gears. Third-octave levels from "
+        f'{check.band[0]:.0f} to {check.band[-1]:.0f} Hz. "Machine against itself" is the median '
+        "difference between the held-out stretch and the one fitted to. A range is that of the "
+        "twin's records."
     )
-    guesses = "\n".join(f"| `{key}` | {value} |" for key, value in assumed.items())
-    table = "\n".join(check_lines(check))
-    return f"""# {name}: a twin fitted to healthy measurements
-
-`gensig generate --config-dir {name} experiment={name} out=runs/{name}` makes its data set.
-Made by: `gensig twin {" ".join(words)}`
-
-## Fitted
-
-| what | value |
-|---|---|
-{rows}
-
-## Given or assumed
-
-| key | where it is from |
-|---|---|
-{guesses}
-
-## Held out
-
-{held_out}, {check.duration:.3g} s, and {N_RECORDS} healthy records of the twin, each of another
-set of gears. Third-octave levels from {check.band[0]:.0f} to {check.band[-1]:.0f} Hz. "Machine
-against itself" is the median difference between the held-out stretch and the one fitted to. A
-range is that of the twin's records.
-
-{table}
-
-{verdict(check)}
-
-![levels](report.png)
-
-{UNKNOWN}
-The files that the options name stand in this folder by their whole path: after moving it, change
-`path.file` and `noise.parts` in `sensing/{name}.yaml`.
-"""
+    files = (
+        "The files that the options name stand in this folder by their whole path: after moving "
+        f"it, change `path.file` and `noise.parts` in `sensing/{name}.yaml`."
+    )
+    picture = [("report.png", "levels")]
+    return page_text(
+        f"{name}: a twin fitted to healthy measurements",
+        [
+            f"`gensig generate --config-dir {name} experiment={name} out=runs/{name}` makes its "
+            f"data set.\nMade by: `gensig twin {' '.join(words)}`"
+        ],
+        [
+            Section(title="Fitted", table=found),
+            Section(title="Given or assumed", table=given),
+            Section(title="Held out", text=[how], table=check_table(check)),
+            Section(title="", text=[verdict(check)], figures=picture),
+            Section(title="What healthy data cannot tell", text=[UNKNOWN, files]),
+        ],
+    )

@@ -3,7 +3,8 @@
 from measured_range import measured
 from validation.realism_section import realism_lines
 
-from gensig.report.realism import compare, write_results
+from benchmarks._realism_results import write_results
+from gensig.report.realism import compare
 
 
 def test_section(tmp_path):

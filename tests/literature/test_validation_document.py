@@ -19,7 +19,7 @@ from validation.verdicts import evaluate, run_validation
 from gensig.cli import main
 
 DOCS = Path(__file__).parents[2] / "docs"
-MOST_WORDS = 1500
+MOST_WORDS = 1000
 NUMBER = re.compile(r"(~)?[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?( %)?")
 
 
@@ -127,16 +127,17 @@ def test_a_changed_page_is_noticed(pages):
 
 
 def test_pages_can_be_read(pages):
-    """At most 1,500 words a paper, and one table of the same width."""
+    """At most 1,000 words a paper, and one table of the same width."""
     for name in PAGES:
         page = pages[f"validation/{name}.md"]
         assert len(re.findall(r"[^\s|]+", page)) <= MOST_WORDS, name
         tables = [line for line in page.splitlines() if line.startswith("| ")]
-        assert {line.count("|") for line in tables} == {8}
+        assert {line.count("|") for line in tables} == {6}
     assert len(re.findall(r"[^\s|]+", pages["validation.md"])) < 800
 
 
 def test_every_row_is_in_one_csv_and_every_shortfall_has_its_reason(results, pages):
+    """In the CSV; those of the headlines on the page too."""
     seen = []
     for name, page in PAGES.items():
         rows = list(csv.DictReader(io.StringIO(pages[f"validation/{name}.csv"])))
@@ -144,9 +145,11 @@ def test_every_row_is_in_one_csv_and_every_shortfall_has_its_reason(results, pag
         seen += [row["id"] for row in rows]
         text = " ".join(pages[f"validation/{name}.md"].split())
         for row in rows:
+            line = row["id"].rpartition(".")[0]
             if row["verdict"] in (DIFFERS, FAILS):
-                assert " ".join(row["reason"].split()) in text
-                assert f"*{row['id'].rpartition('.')[0]}*" in text
+                assert row["reason"].strip()
+                told = " ".join(row["reason"].split()) in text and f"*{line}*" in text
+                assert told or line not in page.headlines
     assert sorted(seen) == sorted(result.row.id for result in results)
 
 

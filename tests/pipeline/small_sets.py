@@ -18,6 +18,10 @@ def make(out, *overrides):
     return out
 
 
+def resume(out):
+    return main(["resume", "--quiet", str(out), "--workers", "1"])
+
+
 def contents(folder):
     """Bytes of every file of a data set that its bits decide, unfinished ones included."""
     paths = [path for part in PARTS for path in folder.glob(part)]

@@ -11,7 +11,7 @@ from gensig.plan.make import make_plan
 from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_records
 
-WITH_ROSS = "_ross_time", "_ross_time_response", "_ross_values"
+WITH_ROSS = ("_ross_values",)
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import torch
 import torch.utils.data
 
+from diagnose.data.loading.stored import VibrationDataset
 from diagnose.data.loading.transforms import AnyTransform, transformed
-from diagnose.data.torch_sets import VibrationDataset
 from gensig.errors import ConfigError
 
 if TYPE_CHECKING:

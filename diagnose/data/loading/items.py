@@ -11,7 +11,8 @@ import torch
 from numpy.typing import NDArray
 
 from diagnose.data.lives import COLUMNS as LIFE_COLUMNS
-from diagnose.data.windows import Task, check_names
+from diagnose.data.lives import kept_segments
+from diagnose.data.windows import Segments, Task, check_names, subset_segments
 from gensig.errors import ConfigError
 
 NO_GEAR = "none"  # first of the names of a gear target: a healthy record
@@ -38,6 +39,9 @@ METADATA = (
 )
 
 Value = int | torch.Tensor
+Item = tuple[
+    Any, ...
+]  # window and target; with ``return_metadata`` the metadata are third
 Metadata = dict[str, int | float | str]
 
 
@@ -78,6 +82,22 @@ def target_of(task: Task, name: str) -> Target:
     """
     check_names("target", (name,), tuple(TARGETS))
     return TARGETS[name](task)
+
+
+def known_segments(task: Task, target: Target, protocol: str, subset: str) -> Segments:
+    """Stretches of one subset of a split whose records have a target.
+
+    Raises
+    ------
+    ConfigError    for a name that does not exist, or a subset without such records
+    """
+    segments = kept_segments(subset_segments(task, protocol, subset), target.known)
+    if not segments.record.size:
+        raise ConfigError(
+            f"protocol {protocol}: no record of its {subset} part has this target; "
+            "take another target or make more records"
+        )
+    return segments
 
 
 def _class_target(task: Task) -> Target:

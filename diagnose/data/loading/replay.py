@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import itertools
+from collections import deque
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import torch
 import torch.utils.data
 from numpy.typing import NDArray
 
-from diagnose.data.loading.items import metadata_of
-from diagnose.data.loading.records_ahead import RecordsAhead
+from diagnose.data.loading.items import Item
 from diagnose.data.loading.streamed import (
     StreamedRecord,
     StreamedWindows,
-    WindowOptions,
     worker_share,
 )
-from diagnose.data.loading.transforms import AnyTransform, transformed
+from diagnose.data.loading.transforms import transformed
 from diagnose.data.windows import normalised
 from gensig.errors import ConfigError
 
@@ -29,19 +28,11 @@ from gensig.errors import ConfigError
 N_AHEAD = 16
 # Spawn keys of the seeds of one record's starts and of one worker's draws.
 START_STREAM, DRAW_STREAM = 9201, 9202
-
-Batch = tuple[Any, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Draw:
-    """One window that is drawn: its record and its first sample."""
-
-    record: StreamedRecord
-    start: int
+T = TypeVar("T")
+Draw = tuple[StreamedRecord, int]  # of one window: its record and its first sample
 
 
-class ReplayStream(torch.utils.data.IterableDataset[Batch]):
+class ReplayStream(StreamedWindows):
     """Windows drawn at random from simulated records, each record ``reuse`` times over.
 
     Every worker of a loader holds ``buffer_records`` records in memory. It draws a record of
@@ -51,22 +42,19 @@ class ReplayStream(torch.utils.data.IterableDataset[Batch]):
 
     Parameters
     ----------
-    stream : as made by ``gensig.stream``, or a part of it
-    protocol, subset, window_samples, stride_samples, channels, classes, normalise, target,
-    return_metadata, n_epochs : as for `StreamingDataset`
+    stream, protocol, subset, options : as for `StreamedWindows`
     reuse : draws of each planned window of a record; None keeps each record until a newer one
         is ready and never waits, but is then not repeatable, and needs ``n_epochs=None``
     buffer_records : records that each worker holds, 4 bytes a sample
     crop : cut anywhere in the stretch of the subset; False cuts the planned windows, each
         exactly ``reuse`` times
     batch_size : windows of a batch; None yields single windows, for a loader that makes batches
-    transform : function of a batch (batch, channel, sample), or of a window (channel, sample)
-        where ``batch_size`` is None, after `normalise`
+    transform : of the options: function of a batch (batch, channel, sample), or of a window
+        (channel, sample) where ``batch_size`` is None, after `normalise`
 
     Raises
     ------
-    ConfigError    for a number below 1, a name that does not exist, a target that the stream
-        lacks, or a subset that would be empty
+    ConfigError    as `StreamedWindows`, and for a number below 1
 
     Notes
     -----
@@ -84,19 +72,11 @@ class ReplayStream(torch.utils.data.IterableDataset[Batch]):
         protocol: str | None = None,
         subset: str | None = None,
         *,
-        window_samples: int,
-        stride_samples: int,
-        channels: Sequence[str] | None = None,
-        classes: Sequence[str] | None = None,
-        normalise: str = "rms",
-        transform: AnyTransform | None = None,
-        target: str = "class",
-        return_metadata: bool = False,
-        n_epochs: int | None = 1,
         reuse: int | None = 16,
         buffer_records: int = 64,
         crop: bool = True,
         batch_size: int | None = None,
+        **options: Any,
     ) -> None:
         numbers = {
             "reuse": reuse,
@@ -106,26 +86,12 @@ class ReplayStream(torch.utils.data.IterableDataset[Batch]):
         for name, number in numbers.items():
             if number is not None and number < 1:
                 raise ConfigError(f"{name} = {number} must be at least 1")
-        if reuse is None and n_epochs is not None:
+        super().__init__(stream, protocol, subset, **options)
+        if reuse is None and self.n_epochs is not None:
             raise ConfigError(
-                f"reuse=None never ends, and n_epochs = {n_epochs}; give n_epochs=None"
+                f"reuse=None never ends, and n_epochs = {self.n_epochs}; give n_epochs=None"
             )
-        options = WindowOptions(
-            protocol=protocol,
-            subset=subset,
-            window_samples=window_samples,
-            stride_samples=stride_samples,
-            channels=channels,
-            classes=classes,
-            normalise=normalise,
-            target=target,
-            n_epochs=n_epochs,
-        )
-        self._windows = StreamedWindows(stream, options)
-        self.class_names = self._windows.class_names
-        self.target_names = self._windows.target_names
-        self.transform, self.return_metadata = transform, return_metadata
-        self.n_epochs, self.reuse, self.crop = n_epochs, reuse, crop
+        self.reuse, self.crop = reuse, crop
         self.buffer_records, self.batch_size = buffer_records, batch_size
 
     @property
@@ -133,27 +99,18 @@ class ReplayStream(torch.utils.data.IterableDataset[Batch]):
         """Windows that an epoch gives if no record fails; None without ``reuse``."""
         if self.reuse is None:
             return None
-        return self._windows.n_windows * self.reuse
+        return self._n_planned * self.reuse
 
-    @property
-    def epoch(self) -> int:
-        """Epoch at which the next pass begins."""
-        return self._windows.epoch
-
-    def set_epoch(self, epoch: int) -> None:
-        """Begin the next pass at another epoch, in every worker."""
-        self._windows.set_epoch(epoch)
-
-    def __iter__(self) -> Iterator[Batch]:
+    def __iter__(self) -> Iterator[Item]:
         index, n_workers = worker_share()
         epoch = self.epoch
         sequence = np.random.SeedSequence(
-            self._windows.stream.seed, spawn_key=(DRAW_STREAM, epoch, index)
+            self.stream.seed, spawn_key=(DRAW_STREAM, epoch, index)
         )
         order, transform = sequence.spawn(2)
         generator = torch.Generator()
         generator.manual_seed(int(transform.generate_state(1, np.uint64)[0] >> 1))
-        records = self._windows.records(epoch, index, n_workers)
+        records = self._records(epoch, index, n_workers)
         ahead = RecordsAhead(records, N_AHEAD)
         with closing(ahead):
             draws = self._draws(ahead, np.random.default_rng(order))
@@ -162,7 +119,7 @@ class ReplayStream(torch.utils.data.IterableDataset[Batch]):
 
     def _draws(
         self, ahead: RecordsAhead[StreamedRecord], rng: np.random.Generator
-    ) -> Iterator[_Draw]:
+    ) -> Iterator[Draw]:
         """Draws from a buffer, in which a record that is used up gives way to the next."""
         buffer: list[_HeldRecord] = []
         while len(buffer) < self.buffer_records and (record := ahead.take()):
@@ -171,7 +128,7 @@ class ReplayStream(torch.utils.data.IterableDataset[Batch]):
         while buffer:
             place = int(rng.integers(len(buffer)))
             held = buffer[place]
-            yield _Draw(record=held.record, start=held.next_start())
+            yield held.record, held.next_start()
             if self.reuse is None:
                 if ahead.is_ready() and (record := ahead.take()):
                     buffer[n_replaced % len(buffer)] = self._held(record)
@@ -186,29 +143,22 @@ class ReplayStream(torch.utils.data.IterableDataset[Batch]):
     def _held(self, record: StreamedRecord) -> _HeldRecord:
         return _HeldRecord(record, reuse=self.reuse or 1, crop=self.crop)
 
-    def _item(self, chosen: Sequence[_Draw], generator: torch.Generator) -> Batch:
+    def _item(self, chosen: Sequence[Draw], generator: torch.Generator) -> Item:
         """Batch of some draws, or the one window."""
-        options = self._windows.options
-        length = options.window_samples
-        n_channels = chosen[0].record.signal.shape[0]
+        length = self._window_samples
+        n_channels = chosen[0][0].signal.shape[0]
         signals = np.empty((len(chosen), n_channels, length), dtype=np.float32)
-        for row, draw in zip(signals, chosen, strict=True):
-            row[...] = draw.record.signal[:, draw.start : draw.start + length]
-        windows = torch.from_numpy(normalised(signals, options.normalise))
+        for row, (record, start) in zip(signals, chosen, strict=True):
+            row[...] = record.signal[:, start : start + length]
+        windows = torch.from_numpy(normalised(signals, self._normalise))
         if self.batch_size is None:
             window = transformed(windows[0], self.transform, generator)
-            return window, *self._facts(chosen[0])
+            return window, *self._facts(*chosen[0])
         windows = transformed(windows, self.transform, generator)
-        facts = torch.utils.data.default_collate([self._facts(draw) for draw in chosen])
+        facts = torch.utils.data.default_collate(
+            [self._facts(*draw) for draw in chosen]
+        )
         return windows, *facts
-
-    def _facts(self, draw: _Draw) -> tuple[Any, ...]:
-        """Target of a draw, and its metadata where they are wanted."""
-        if not self.return_metadata:
-            return (draw.record.target,)
-        rate = self._windows.sampling_rate
-        metadata = metadata_of(draw.record.values, draw.start, rate)
-        return draw.record.target, metadata
 
 
 class _HeldRecord:
@@ -246,3 +196,46 @@ class _HeldRecord:
         if not self._crop:
             return windows.start[place]
         return self._rng.integers(windows.earliest[place], windows.latest[place] + 1)
+
+
+class RecordsAhead(Generic[T]):
+    """Items of an iterator in its order, made ahead of time by one thread of this process.
+
+    The integrator of records runs without the lock of the interpreter, so that the thread takes
+    a second core where there is one.
+
+    Parameters
+    ----------
+    items : iterated by the thread alone
+    n_ahead : items that are made before they are asked for
+    """
+
+    def __init__(self, items: Iterator[T], n_ahead: int) -> None:
+        self._items = items
+        self._thread = ThreadPoolExecutor(max_workers=1)
+        self._waiting: deque[Future[T | None]] = deque()
+        for _ in range(n_ahead):
+            self._order()
+
+    def take(self) -> T | None:
+        """Next item, waited for; None after the last.
+
+        Raises the error of the iterator.
+        """
+        if not self._waiting:
+            return None
+        item = self._waiting.popleft().result()
+        if item is not None:
+            self._order()
+        return item
+
+    def is_ready(self) -> bool:
+        """True if ``take`` returns at once."""
+        return not self._waiting or self._waiting[0].done()
+
+    def close(self) -> None:
+        """Stop the thread after the item that it makes now."""
+        self._thread.shutdown(wait=True, cancel_futures=True)
+
+    def _order(self) -> None:
+        self._waiting.append(self._thread.submit(next, self._items, None))

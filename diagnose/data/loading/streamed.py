@@ -1,9 +1,10 @@
-"""Records of a stream that one worker of a loader simulates, with the windows planned on them."""
+"""Windows of records that are simulated during training, of which nothing is stored."""
 
 from __future__ import annotations
 
+import functools
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,52 +13,24 @@ import torch
 import torch.utils.data
 from numpy.typing import NDArray
 
-from diagnose.data.lives import kept_segments
-from diagnose.data.loading.items import Target, Value, target_of
+from diagnose.data.loading.items import (
+    Item,
+    Target,
+    Value,
+    known_segments,
+    metadata_of,
+    target_of,
+)
+from diagnose.data.loading.transforms import AnyTransform, transformed
 from diagnose.data.windows import (
     IntArray,
     Segments,
     Task,
+    normalised,
     plan_windows,
-    subset_segments,
     task_of,
 )
 from gensig.errors import ConfigError, DatasetError
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WindowOptions:
-    """Options of the windows of a stream, as `diagnose.data.torch_sets` documents them."""
-
-    protocol: str | None
-    subset: str | None
-    window_samples: int
-    stride_samples: int
-    channels: Sequence[str] | None
-    classes: Sequence[str] | None
-    normalise: str
-    target: str
-    n_epochs: int | None
-
-    def __post_init__(self) -> None:
-        if (self.protocol is None) != (self.subset is None):
-            raise ConfigError("give protocol and subset, or neither of them")
-        if self.n_epochs is not None and self.n_epochs < 1:
-            raise ConfigError(
-                f"n_epochs must be at least 1 or None, not {self.n_epochs}"
-            )
-
-    def task(self, stream: Any) -> Task:
-        """Task of a stream, whose one class is enough where classes are not the target."""
-        return task_of(
-            stream,
-            window_samples=self.window_samples,
-            stride_samples=self.stride_samples,
-            normalise=self.normalise,
-            classes=self.classes,
-            channels=self.channels,
-            one_class=self.target != "class",
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -96,13 +69,16 @@ class StreamedRecord:
     values: Mapping[str, Any]
 
 
-class StreamedWindows:
+class StreamedWindows(torch.utils.data.IterableDataset[Item]):
     """Windows planned on a stream, and the records of each worker of a loader.
 
     Parameters
     ----------
     stream : as made by ``gensig.stream``, or a part of it
-    options : of the windows
+    protocol, subset : as for `VibrationDataset`; all records if both are None
+    window_samples, stride_samples, channels, classes, normalise : as for `VibrationDataset`
+    transform, target, return_metadata : as for `VibrationDataset`
+    n_epochs : epochs in one pass, each with other random draws, of units too; None never ends
 
     Raises
     ------
@@ -110,13 +86,44 @@ class StreamedWindows:
         that would be empty
     """
 
-    def __init__(self, stream: Any, options: WindowOptions) -> None:
-        self.stream, self.options = stream, options
-        task, target, windows = _plan(stream, options)
+    def __init__(
+        self,
+        stream: Any,
+        protocol: str | None = None,
+        subset: str | None = None,
+        *,
+        window_samples: int,
+        stride_samples: int,
+        channels: Sequence[str] | None = None,
+        classes: Sequence[str] | None = None,
+        normalise: str = "rms",
+        transform: AnyTransform | None = None,
+        target: str = "class",
+        return_metadata: bool = False,
+        n_epochs: int | None = 1,
+    ) -> None:
+        if (protocol is None) != (subset is None):
+            raise ConfigError("give protocol and subset, or neither of them")
+        if n_epochs is not None and n_epochs < 1:
+            raise ConfigError(f"n_epochs must be at least 1 or None, not {n_epochs}")
+        self.stream, self.n_epochs = stream, n_epochs
+        self.transform, self.return_metadata = transform, return_metadata
+        self._protocol, self._subset, self._target = protocol, subset, target
+        self._window_samples, self._normalise = window_samples, normalise
+        self._task_of = functools.partial(
+            task_of,
+            window_samples=window_samples,
+            stride_samples=stride_samples,
+            normalise=normalise,
+            classes=classes,
+            channels=channels,
+            one_class=target != "class",
+        )
+        task, values, windows = self._planned(stream)
         self.class_names = task.class_names
-        self.target_names = target.names
-        self.sampling_rate = float(stream.sampling_rate)
-        self.n_windows = sum(planned.start.size for planned in windows.values())
+        self.target_names = values.names
+        self._sampling_rate = float(stream.sampling_rate)
+        self._n_planned = sum(planned.start.size for planned in windows.values())
         # shared memory, so that workers that stay alive between passes see a new epoch
         self._epoch = torch.tensor(stream.epoch).share_memory_()
 
@@ -135,7 +142,7 @@ class StreamedWindows:
             raise ConfigError(f"epoch = {epoch} must be at least 0")
         self._epoch.fill_(epoch)
 
-    def records(
+    def _records(
         self, first_epoch: int, worker: int, n_workers: int
     ) -> Iterator[StreamedRecord]:
         """Records of one worker in the plan's order, failed ones left out.
@@ -145,13 +152,12 @@ class StreamedWindows:
         DatasetError    for a signal that is not finite
         """
         for epoch in itertools.count(first_epoch):
-            n_epochs = self.options.n_epochs
-            if n_epochs is not None and epoch == first_epoch + n_epochs:
+            if self.n_epochs is not None and epoch == first_epoch + self.n_epochs:
                 return
             stream = self.stream.at_epoch(epoch)
-            task, target, windows = _plan(stream, self.options)
+            task, target, windows = self._planned(stream)
             part = stream.take(sorted(windows)).shard(worker, n_workers)
-            if n_epochs is None and not len(part):
+            if self.n_epochs is None and not len(part):
                 return  # fewer conditions than workers: no record will ever come
             record_ids = stream.column("record_id").tolist()
             index_of = {name: index for index, name in enumerate(record_ids)}
@@ -168,6 +174,97 @@ class StreamedWindows:
                     values=record.values,
                 )
 
+    def _facts(self, record: StreamedRecord, start: int) -> tuple[Any, ...]:
+        """Target of a window, and its metadata where they are wanted."""
+        if not self.return_metadata:
+            return (record.target,)
+        metadata = metadata_of(record.values, start, self._sampling_rate)
+        return record.target, metadata
+
+    def _planned(self, stream: Any) -> tuple[Task, Target, dict[int, PlannedWindows]]:
+        """Task and target of one epoch; record -> its windows, without empty ones."""
+        task = self._task_of(stream)
+        target = target_of(task, self._target)
+        if self._protocol is None or self._subset is None:
+            segments = _whole_records(task, target)
+        else:
+            segments = known_segments(task, target, self._protocol, self._subset)
+        segment, start = plan_windows(
+            segments, task.window_samples, task.stride_samples
+        )
+        record = segments.record[segment]
+        earliest = segments.start[segment]
+        latest = segments.stop[segment] - task.window_samples
+        order = np.argsort(record, kind="stable")
+        records, first = np.unique(record[order], return_index=True)
+        parts = np.split(order, first[1:])
+        windows = {
+            int(number): PlannedWindows(
+                start=start[part], earliest=earliest[part], latest=latest[part]
+            )
+            for number, part in zip(records, parts, strict=True)
+        }
+        return task, target, windows
+
+
+class StreamingDataset(StreamedWindows):
+    """Windows of records that are simulated during training; safe in forked and spawned workers.
+
+    Nothing is stored. Each record goes to one of the workers of a loader. On several computers,
+    give each its ``stream.shard(rank, n_machines)``. Without ``shuffle_buffer`` and workers, the
+    items are those of `VibrationDataset` on the stored data set, in the same order and with the
+    same bits.
+
+    Parameters
+    ----------
+    stream, protocol, subset, options : as for `StreamedWindows`
+    shuffle_buffer : windows that every worker holds back and draws from at random; 0 keeps the
+        plan's order
+
+    Raises
+    ------
+    ConfigError    as `StreamedWindows`, and for a buffer below 0
+
+    Notes
+    -----
+    A pass begins at the epoch of ``set_epoch``, else at that of the stream: without
+    ``set_epoch`` every pass is the same. The set of windows depends on nothing else, and their
+    order only on the number of workers. Records that failed are left out. ``n_windows`` is the
+    number of windows of an epoch in which no record fails.
+    """
+
+    def __init__(
+        self,
+        stream: Any,
+        protocol: str | None = None,
+        subset: str | None = None,
+        *,
+        shuffle_buffer: int = 0,
+        **options: Any,
+    ) -> None:
+        if shuffle_buffer < 0:
+            raise ConfigError(f"shuffle_buffer = {shuffle_buffer} must be at least 0")
+        super().__init__(stream, protocol, subset, **options)
+        self.shuffle_buffer, self.n_windows = shuffle_buffer, self._n_planned
+
+    def __iter__(self) -> Iterator[Item]:
+        index, n_workers = worker_share()
+        epoch = self.epoch
+        items = self._items(epoch, index, n_workers)
+        if self.shuffle_buffer:
+            rng = np.random.default_rng([self.stream.seed, epoch, index])
+            items = _shuffled(items, self.shuffle_buffer, rng)
+        return items
+
+    def _items(self, first_epoch: int, worker: int, n_workers: int) -> Iterator[Item]:
+        """The items of one worker in the plan's order."""
+        for record in self._records(first_epoch, worker, n_workers):
+            for start in record.windows.start.tolist():
+                cut = record.signal[:, start : start + self._window_samples]
+                normal = normalised(np.ascontiguousarray(cut), self._normalise)
+                window = transformed(torch.from_numpy(normal), self.transform)
+                yield window, *self._facts(record, start)
+
 
 def worker_share() -> tuple[int, int]:
     """Number of this worker of a loader, and of all its workers."""
@@ -175,48 +272,6 @@ def worker_share() -> tuple[int, int]:
     if worker is None:
         return 0, 1
     return worker.id, worker.num_workers
-
-
-def known_segments(task: Task, target: Target, protocol: str, subset: str) -> Segments:
-    """Stretches of one subset of a split whose records have a target.
-
-    Raises
-    ------
-    ConfigError    for a name that does not exist, or a subset without such records
-    """
-    segments = kept_segments(subset_segments(task, protocol, subset), target.known)
-    if not segments.record.size:
-        raise ConfigError(
-            f"protocol {protocol}: no record of its {subset} part has this target; "
-            "take another target or make more records"
-        )
-    return segments
-
-
-def _plan(
-    stream: Any, options: WindowOptions
-) -> tuple[Task, Target, dict[int, PlannedWindows]]:
-    """Task and target of one epoch; record -> its windows, without empty ones."""
-    task = options.task(stream)
-    target = target_of(task, options.target)
-    if options.protocol is None or options.subset is None:
-        segments = _whole_records(task, target)
-    else:
-        segments = known_segments(task, target, options.protocol, options.subset)
-    segment, start = plan_windows(segments, task.window_samples, task.stride_samples)
-    record = segments.record[segment]
-    earliest = segments.start[segment]
-    latest = segments.stop[segment] - task.window_samples
-    order = np.argsort(record, kind="stable")
-    records, first = np.unique(record[order], return_index=True)
-    parts = np.split(order, first[1:])
-    windows = {
-        int(number): PlannedWindows(
-            start=start[part], earliest=earliest[part], latest=latest[part]
-        )
-        for number, part in zip(records, parts, strict=True)
-    }
-    return task, target, windows
 
 
 def _whole_records(task: Task, target: Target) -> Segments:
@@ -243,3 +298,18 @@ def _finite_signal(task: Task, record: Any) -> NDArray[np.float32]:
             "its signal holds values that are not finite"
         )
     return signal
+
+
+def _shuffled(
+    items: Iterable[Item], n_held: int, rng: np.random.Generator
+) -> Iterator[Item]:
+    """The same items, each drawn at random from ``n_held`` that are held back."""
+    held: list[Item] = []
+    for item in items:
+        if len(held) < n_held:
+            held.append(item)
+            continue
+        drawn = int(rng.integers(n_held))
+        yield held[drawn]
+        held[drawn] = item
+    yield from (held[index] for index in rng.permutation(len(held)))

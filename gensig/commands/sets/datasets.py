@@ -18,8 +18,7 @@ from gensig.commands.sets.running import (
 )
 from gensig.dataset.folder.beginning import config_text, refuse_used
 from gensig.dataset.folder.joining import joined_folder
-from gensig.dataset.folder.layout import MANIFEST, read_overrides
-from gensig.dataset.folder.manifest import read_manifest
+from gensig.dataset.folder.layout import MANIFEST, read_manifest, read_overrides
 from gensig.dataset.folder.quick_check import absences
 from gensig.errors import ConfigError
 from gensig.options.compose import override_keys

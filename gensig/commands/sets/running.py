@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from gensig.commands.console import remark
 from gensig.dataset.folder.failures import commonest, failure_reasons
-from gensig.dataset.folder.manifest import read_manifest
+from gensig.dataset.folder.layout import read_manifest
 from gensig.errors import Interrupted
 from gensig.terminal.printing import show
 from gensig.terminal.run_progress import RunProgress
@@ -20,7 +20,7 @@ from gensig.terminal.run_progress import RunProgress
 if TYPE_CHECKING:
     from gensig.dataset.folder.layout import ConfigContent
     from gensig.execution.base import Executor
-    from gensig.production.maker import Maker
+    from gensig.production.folder import Maker
 
 
 def run(

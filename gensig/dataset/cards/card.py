@@ -1,8 +1,6 @@
 """The data card: README.md and croissant.json with facts from the files, and caveats."""
 
-import html
-import re
-from collections.abc import Mapping
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,28 +8,31 @@ import yaml
 
 from gensig.dataset.cards.class_figures import write_class_figures
 from gensig.dataset.cards.croissant import croissant_text
-from gensig.dataset.cards.facts import geometry_facts, value_range
+from gensig.dataset.cards.facts import geometry_facts, running_facts, value_range
 from gensig.dataset.cards.origin import origin_of
 from gensig.dataset.folder.layout import CARD, CROISSANT, SHARDS
 from gensig.dataset.reader import Dataset, open_dataset
-from gensig.dataset.splitting.dealing import GROUP_NAMES
 from gensig.dataset.splitting.splits import SUBSETS
 from gensig.dataset.storage.atomic import write_text
+from gensig.text.escaping import plain
+from gensig.text.markdown import escape, page_text
+from gensig.text.page import Section, Table
 
-LOAD = """```python
-import gensig
+LOAD = """import gensig
 
 with gensig.open_dataset("PATH/TO/THIS/FOLDER") as data:
     labels = data.column("label")                    # (record,) index into data.class_names
     signal = data.signals(0)                         # (channel, sample) float32, m/s^2
-    parts = data.split(data.protocols[0])            # the hardest protocol comes first
-```
-Without gensig: every shard is plain HDF5, see `docs/format.md` of gensig. \
-Hugging Face `datasets` takes the folder
-as it is, `load_dataset("PATH/TO/THIS/FOLDER")`; its one split, `train`, is all records, \
-and `splits/` says which are
-for training. `croissant.json` describes the files for machines.
-"""
+    parts = data.split(data.protocols[0])            # the hardest protocol comes first"""
+OTHER_READERS = (
+    "Without gensig: every shard is plain HDF5, see `docs/format.md` of gensig. Hugging Face "
+    '`datasets` takes the folder as it is, `load_dataset("PATH/TO/THIS/FOLDER")`; its one split, '
+    "`train`, is all records, and `splits/` says which are for training. `croissant.json` "
+    "describes the files for machines."
+)
+GALLERY = (
+    "The record of median severity of each class, noise included, on the same axes:"
+)
 
 # Limits that the Hugging Face hub knows; above the last one a card says more.
 SIZES = (
@@ -49,18 +50,17 @@ TAGS = (
     "time-series",
 )
 
-CAVEATS = """- `random_window_leaky` puts windows of one record on every side on purpose. \
-Never report it
-  without a clean split beside it.
-- The speed and the signal power of a record are results: \
-a fault may change them. Report results with and
-  without RMS normalization.
-- Columns of role label, fault or result (`docs/format.md`) \
-and fault parameters in `params/` must not be
-  inputs of a classifier.
-- Records with status 'failed' are kept with their parameters; leave them out with `data.usable`.
-- Only the band given as usable is meant to be used; above it the anti-alias filter acts.
-"""
+CAVEATS = (
+    "`random_window_leaky` puts windows of one record on every side on purpose. Never report it "
+    "without a clean split beside it.",
+    "The speed and the signal power of a record are results: a fault may change them. Report "
+    "results with and without RMS normalization.",
+    "Columns of role label, fault or result (`docs/format.md`) and fault parameters in `params/` "
+    "must not be inputs of a classifier.",
+    "Records with status 'failed' are kept with their parameters; leave them out with "
+    "`data.usable`.",
+    "Only the band given as usable is meant to be used; above it the anti-alias filter acts.",
+)
 
 
 def write_card(out: Path, *, figures: bool = True) -> None:
@@ -78,41 +78,55 @@ def card_text(data: Dataset, pictures: Mapping[str, str] | None = None) -> str:
     ----------
     pictures : path in the folder by class name
     """
-    version, origin = escape(data.manifest.generator_version), origin_of(data.manifest)
-    sections = [
-        front_matter(data),
-        f"# {escape(data.folder.resolve().name)}",
-        f"{origin.made} by gensig {version}.",
-        table(("fact", "value"), set_facts(data)),
-        "## Classes",
-        table(("class", "records", "severity"), class_rows(data)),
-        _gallery(pictures or {}),
-        "## Splits",
-        table(("protocol", *SUBSETS), _splits(data)),
-        "## Load it",
-        LOAD,
-        "## Caveats",
-        caveats_of(data),
-        "## Licence",
-        origin.license_text,
+    records = []
+    if pictures:
+        figures = [(path, name) for name, path in pictures.items()]
+        records.append(Section(title="", text=[GALLERY], figures=figures))
+    table = Table(head=("protocol", *SUBSETS), rows=_splits(data))
+    middle = [
+        *records,
+        Section(title="Splits", table=table),
+        Section(title="Load it", code=LOAD),
+        Section(title="", text=[OTHER_READERS]),
     ]
-    return "\n\n".join(section.strip() for section in sections if section) + "\n"
+    return whole_card(data, front_matter(data), middle, caveats_of(data))
 
 
-def caveats_of(data: Dataset) -> str:
-    """Caveats of a data set, by its origin, as a Markdown list."""
-    return f"{origin_of(data.manifest).caveat}\n{CAVEATS}"
+def whole_card(
+    data: Dataset,
+    matter: str,
+    middle: Sequence[Section],
+    caveats: Sequence[str],
+    *,
+    made: str = "",
+    lacking: Container[str] = (),
+) -> str:
+    """A card: facts and classes, what is its own, caveats and licence.
+
+    Parameters
+    ----------
+    matter : front matter
+    made : words behind the version
+    lacking : facts that are not those of these files
+    """
+    version, origin = escape(data.manifest.generator_version), origin_of(data.manifest)
+    facts = [row for row in set_facts(data) if row[0] not in lacking]
+    classes = Table(head=("class", "records", "severity"), rows=class_rows(data))
+    sections = [
+        Section(title="", table=Table(head=("fact", "value"), rows=facts)),
+        Section(title="Classes", table=classes),
+        *middle,
+        Section(title="Caveats", notes=[("", caveat) for caveat in caveats]),
+        Section(title="Licence", text=[origin.license_text]),
+    ]
+    lead = [f"{origin.made} by gensig {version}{made}."]
+    text = page_text(plain(data.folder.resolve().name), lead, sections)
+    return f"{matter}\n\n{text}"
 
 
-def _gallery(pictures: Mapping[str, str]) -> str:
-    """One picture for each class, under a common title."""
-    if not pictures:
-        return ""
-    title = (
-        "The record of median severity of each class, noise included, on the same axes:"
-    )
-    shown = [f"![{escape(name)}]({path})" for name, path in pictures.items()]
-    return "\n\n".join([title, *shown])
+def caveats_of(data: Dataset) -> list[str]:
+    """Caveats of a data set, by its origin, as Markdown."""
+    return [*origin_of(data.manifest).caveats, *CAVEATS]
 
 
 def front_matter(data: Dataset) -> str:
@@ -149,23 +163,6 @@ def yaml_block(content: Mapping[str, object]) -> str:
     return f"---\n{text}---"
 
 
-def plain(value: object) -> str:
-    """Printable text on one line."""
-    return "".join(c if c.isprintable() else " " for c in str(value))
-
-
-def escape(value: object) -> str:
-    """Text for one Markdown table cell: no HTML, no markup, no line breaks, nothing invisible."""
-    return re.sub(r"([\\`*_\[\]|#~!])", r"\\\1", html.escape(plain(value), quote=False))
-
-
-def table(header: tuple[str, ...], rows: list[tuple[object, ...]]) -> str:
-    """Markdown table with every cell escaped."""
-    lines = [" | ".join(header), " | ".join("---" for _ in header)]
-    lines += [" | ".join(escape(cell) for cell in row) for row in rows]
-    return "\n".join(f"| {line} |" for line in lines)
-
-
 def set_facts(data: Dataset) -> list[tuple[object, ...]]:
     """Rows of fact and value on all records of a data set."""
     units = data.attributes.get("channel_units", ["m/s^2"] * len(data.channel_names))
@@ -186,14 +183,7 @@ def set_facts(data: Dataset) -> list[tuple[object, ...]]:
         "sampling rate": f"{data.sampling_rate:g} Hz",
         "channels": ", ".join(f"{name} ({unit})" for name, unit in pairs),
     }
-    facts |= geometry_facts(data)
-    for column, (_, plural) in GROUP_NAMES.items():
-        facts[plural] = len(np.unique(data.column(column)))
-    speed, torque = data.column("speed_rpm"), data.column("torque_nm")
-    facts["speed of the driving shaft"] = value_range(speed, "r/min")
-    facts[torque_words(data)] = value_range(torque, "N m")
-    if "snr_db" in data.column_names:
-        facts["signal-to-noise ratio"] = value_range(data.column("snr_db"), "dB")
+    facts |= geometry_facts(data) | running_facts(data)
     if data.sample_type == "int16":
         scaled = "int16; times acceleration_scale of record and channel it is m/s^2"
         facts["acceleration in the shards"] = scaled
@@ -227,8 +217,3 @@ def _splits(data: Dataset) -> list[tuple[object, ...]]:
         ]
         rows.append((protocol, *(f"{size:g} records" for size in sizes)))
     return rows
-
-
-def torque_words(data: Dataset) -> str:
-    """Name of the quantity in `torque_nm`, which for a drive line is the torque of its load."""
-    return f"torque of the {plain(data.attributes.get('torque_of', 'driving shaft'))}"

@@ -1,6 +1,7 @@
 """croissant.json: MLCommons Croissant 1.0, with the Responsible-AI fields."""
 
 import json
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from gensig.dataset.folder.layout import MANIFEST, PLAN, SHARDS, SPLITS
 from gensig.dataset.plan import Plan
 from gensig.dataset.reader import Dataset
 from gensig.dataset.schema import PARAMS
+from gensig.text.escaping import plain
 
 _TERMS = (
     "citeAs",
@@ -57,13 +59,13 @@ _CONTEXT |= {term: f"cr:{term}" for term in _TERMS}
 _TYPES = {"U": "sc:Text", "i": "sc:Integer", "f": "sc:Float"}
 
 
-def croissant_text(data: Dataset, caveats: str) -> str:
+def croissant_text(data: Dataset, caveats: Sequence[str]) -> str:
     """The description as JSON-LD: facts from the manifest, the plan and the shards.
 
     `caveats` as limitations.
     """
     manifest, origin = data.manifest, origin_of(data.manifest)
-    name = "".join(c if c.isprintable() else " " for c in data.folder.resolve().name)
+    name = plain(data.folder.resolve().name)
     facts = (
         f"{data.n_records} records of {data.n_samples} samples at {data.sampling_rate:g} Hz, "
         f"{len(data.channel_names)} channels, classes {', '.join(data.class_names)}"
@@ -97,15 +99,15 @@ def croissant_text(data: Dataset, caveats: str) -> str:
     return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
 
 
-def _responsible_ai(data: Dataset, facts: str, caveats: str) -> dict[str, Any]:
+def _responsible_ai(
+    data: Dataset, facts: str, caveats: Sequence[str]
+) -> dict[str, Any]:
     """Fields on the origin of the data and the limits of their use."""
     of_examples = data.column("label_name")[~data.is_reference]
     names, counts = np.unique(of_examples, return_counts=True)
     pairs = zip(names.tolist(), counts.tolist(), strict=True)
     classes = ", ".join(f"{name} {count}" for name, count in pairs)
     failed = int(np.count_nonzero(~data.usable))
-    lines = caveats.replace("\n  ", " ").strip().splitlines()
-    limits = [line.removeprefix("- ") for line in lines]
     return {
         "rai:dataCollection": (
             "Simulated from physics; nothing was measured. config.yaml and plan.csv hold every "
@@ -122,7 +124,7 @@ def _responsible_ai(data: Dataset, facts: str, caveats: str) -> dict[str, Any]:
             "Integrated at a multiple of the sampling rate, low-passed and decimated; noise "
             "added at the stated ratio."
         ],
-        "rai:dataLimitations": limits,
+        "rai:dataLimitations": list(caveats),
         "rai:dataBiases": [
             f"Records per class: {classes}; real machines are nearly always healthy.",
             f"{kind_of_machine(data)}, "

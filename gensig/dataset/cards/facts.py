@@ -6,7 +6,9 @@ import numpy as np
 
 from gensig.dataset.columns import GEAR_COLUMNS, GEAR_NAMES, GEAR_PINION_TURNS
 from gensig.dataset.reader import Dataset
+from gensig.dataset.splitting.dealing import GROUP_NAMES
 from gensig.errors import DatasetError
+from gensig.text.escaping import plain
 
 GEOMETRY = (*GEAR_COLUMNS, "usable_band_hz")
 
@@ -57,6 +59,25 @@ def geometry_facts(data: Dataset) -> dict[str, object]:
         elif name in data.attributes:
             facts[name] = rounded(data.attributes[name])
     return facts | gear_facts(data)
+
+
+def running_facts(data: Dataset) -> dict[str, object]:
+    """Groups of machines by name, and ranges of speed, torque and signal-to-noise ratio."""
+    facts: dict[str, object] = {
+        plural: len(np.unique(data.column(column)))
+        for column, (_, plural) in GROUP_NAMES.items()
+    }
+    # for a drive line the torque of its load
+    turned = plain(data.attributes.get("torque_of", "driving shaft"))
+    ranges = {
+        "speed_rpm": ("speed of the driving shaft", "r/min"),
+        "torque_nm": (f"torque of the {turned}", "N m"),
+        "snr_db": ("signal-to-noise ratio", "dB"),
+    }
+    for column, (name, unit) in ranges.items():
+        if column in data.column_names:
+            facts[name] = value_range(data.column(column), unit)
+    return facts
 
 
 def kind_of_machine(data: Dataset) -> str:

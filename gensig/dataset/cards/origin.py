@@ -18,7 +18,7 @@ class Origin:
     ----------
     made : how the records were made, before "by gensig VERSION"
     kind : the same in two words, for citations
-    caveat : first of the caveats of a card
+    caveats : first of those of a card, as Markdown
     license_name, license_address, license_text : of the data
     tags : further tags of the hub
     responsible : fields of the Responsible-AI part of a Croissant description that differ
@@ -26,7 +26,7 @@ class Origin:
 
     made: str
     kind: str
-    caveat: str
+    caveats: tuple[str, ...]
     license_name: str
     license_address: str
     license_text: str
@@ -37,15 +37,15 @@ class Origin:
 SIMULATED = Origin(
     made="Gear vibration, simulated and labelled",
     kind="simulated gear vibration",
-    caveat=(
-        "- The records are simulated. "
-        "A model trained on them alone has proved nothing about measured signals."
+    caveats=(
+        "The records are simulated. A model trained on them alone has proved nothing about "
+        "measured signals.",
     ),
     license_name="cc-by-4.0",
     license_address="https://creativecommons.org/licenses/by/4.0/",
     license_text=(
         "Data licence: CC BY 4.0 (https://creativecommons.org/licenses/by/4.0/): "
-        "free to use, name the source.\n"
+        "free to use, name the source."
     ),
     tags=("synthetic", "simulation"),
     responsible={},
@@ -54,19 +54,19 @@ SIMULATED = Origin(
 IMPLANTED = Origin(
     made="Healthy recordings that carry residuals of simulated gear faults, made and labelled",
     kind="recordings with implanted gear faults",
-    caveat=(
-        "- The records are healthy recordings of one machine plus residuals of simulated faults. "
-        "No fault was measured.\n"
-        "- Never score a model on a stretch of a recording that carried: config.yaml lists the "
-        "blocks that did, and those held out.\n"
-        "- The level of a residual is drawn (`params/implant_gain_db`). It says nothing of how "
-        "loud a fault of the machine would be."
+    caveats=(
+        "The records are healthy recordings of one machine plus residuals of simulated faults. "
+        "No fault was measured.",
+        "Never score a model on a stretch of a recording that carried: config.yaml lists the "
+        "blocks that did, and those held out.",
+        "The level of a residual is drawn (`params/implant_gain_db`). It says nothing of how "
+        "loud a fault of the machine would be.",
     ),
     license_name="other",
     license_address="urn:gensig:licence-of-the-recordings",
     license_text=(
         "The recordings are those of whoever made them, and gensig knows no licence of theirs: "
-        "ask before you pass this data set on.\n"
+        "ask before you pass this data set on."
     ),
     tags=("semi-synthetic",),
     responsible={

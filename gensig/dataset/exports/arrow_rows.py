@@ -1,17 +1,20 @@
-"""Rows of a data set as record batches of Arrow, with few records in memory.
+"""Rows of a data set as record batches of Arrow, with few records in memory, and as one file.
 
 Needs the package pyarrow; imported by the exports to Parquet only.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 import pyarrow
 from numpy.typing import NDArray
+from pyarrow import parquet
 
+from gensig.dataset.exports import export_tables
 from gensig.dataset.exports.export_tables import column_names, signal_row, unit_of
-from gensig.dataset.exports.split_columns import Stretches
+from gensig.dataset.exports.split_columns import Stretches, whole_records
 from gensig.dataset.reader import Dataset
 
 LABEL = "label"
@@ -136,3 +139,36 @@ def text_columns(schema: pyarrow.Schema) -> list[str]:
     memory and time.
     """
     return [field.name for field in schema if pyarrow.types.is_string(field.type)]
+
+
+def write_parquet(
+    data: Dataset,
+    path: Path,
+    *,
+    samples: bool,
+    further: Mapping[str, NDArray[np.generic]],
+) -> None:
+    """Write one row a record; units are notes of the columns.
+
+    Parameters
+    ----------
+    data : Dataset
+    path : Path                    file to write
+    samples : bool                 time signals too, as lists of fixed length
+    further : name -> (record,)    further columns
+    """
+    rows = whole_records(data)
+    signals: list[str] = []
+    step = export_tables.ROWS_LIMIT
+    if samples:
+        signals = data.signal_names
+        step = export_tables.rows_of_group(export_tables.record_bytes(data))
+    source = RowSource(
+        data=data, n_samples=data.n_samples, signals=signals, further=further
+    )
+    notes = {"gensig": export_tables.attributes_json(data.attributes)}
+    schema = source.schema(rows, notes)
+    texts = text_columns(schema)
+    with parquet.ParquetWriter(path, schema, use_dictionary=texts) as writer:
+        for batch in source.batches(rows, step):
+            writer.write_batch(batch.replace_schema_metadata(schema.metadata))

@@ -161,7 +161,7 @@ def _write(
         return
     further = split_columns(data, splits)
     if to == "parquet":
-        from gensig.dataset.exports.parquet_file import write_parquet
+        from gensig.dataset.exports.arrow_rows import write_parquet
 
         write_parquet(data, path, samples=samples, further=further)
         return

@@ -1,17 +1,9 @@
 """The card of a data set in the form of Hugging Face: README.md with its front matter."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from gensig.dataset.cards.card import (
-    class_rows,
-    escape,
-    hub_facts,
-    plain,
-    set_facts,
-    table,
-    yaml_block,
-)
+from gensig.dataset.cards.card import hub_facts, whole_card, yaml_block
 from gensig.dataset.cards.origin import origin_of
 from gensig.dataset.exports.export_tables import unit_of
 from gensig.dataset.exports.hub_features import Feature, card_features
@@ -20,46 +12,43 @@ from gensig.dataset.reader import Dataset
 from gensig.dataset.schema import PARAMS, known_column
 from gensig.dataset.splitting.protocols import PROTOCOLS
 from gensig.dataset.splitting.splits import SUBSETS
+from gensig.text.escaping import plain
+from gensig.text.page import Section, Table
 
 DATA = "data"  # folder of the Parquet files
 OF_SHARDS = ("acceleration in the shards", "compression")  # facts that an export lacks
 
-LOAD = """```python
-from datasets import load_dataset
+LOAD = """from datasets import load_dataset
 
 records = load_dataset("PATH/TO/THIS/FOLDER", "{protocol}").with_format("numpy")
 record = records["train"][0]
 signal = record["acceleration"]                          # (channel, sample) float32
-names = records["train"].features["label"].names         # class of label 0, 1, ...
-```
-`load_dataset` needs datasets 4.0 or later. The Parquet files need no Hugging Face library. Load \
-the files of one protocol
-only: together with those of another, training has the units of its test.
-"""
-
-LEAKY = """**`{protocol}` leaks.** Windows of the same record are in every subset, on purpose. A \
-score on it says
-nothing of a machine that was not trained on. Never report it without a clean split beside it.
-"""
-
-UNCHECKED = """**`{protocol}` is unchecked.** The version of gensig that wrote this folder does \
-not know which machines
-it keeps apart.
-"""
-
-STRETCHES = """Rows of `{protocol}` are stretches of records: the signals from `start_sample` to \
-before `stop_sample`, in
-samples of the record. No sample is in two rows.
-"""
-
-CAVEATS = """- Inputs of a classifier are signals, and at most columns of role condition. \
-Columns of role label, fault or
-  result and those that begin with `params/` must not be inputs.
-- The speed and the signal power of a record are results: a fault may change them. Report results \
-with and
-  without RMS normalization.
-- A clean split compares scores on machines never seen. Tune on `validation`; use `test` once.
-"""
+names = records["train"].features["label"].names         # class of label 0, 1, ..."""
+ONE_PROTOCOL = (
+    "`load_dataset` needs datasets 4.0 or later. The Parquet files need no Hugging Face library. "
+    "Load the files of one protocol only: together with those of another, training has the units "
+    "of its test."
+)
+LEAKY = (
+    "**`{protocol}` leaks.** Windows of the same record are in every subset, on purpose. A score "
+    "on it says nothing of a machine that was not trained on. Never report it without a clean "
+    "split beside it."
+)
+UNCHECKED = (
+    "**`{protocol}` is unchecked.** The version of gensig that wrote this folder does not know "
+    "which machines it keeps apart."
+)
+STRETCHES = (
+    "Rows of `{protocol}` are stretches of records: the signals from `start_sample` to before "
+    "`stop_sample`, in samples of the record. No sample is in two rows."
+)
+CAVEATS = (
+    "Inputs of a classifier are signals, and at most columns of role condition. Columns of role "
+    "label, fault or result and those that begin with `params/` must not be inputs.",
+    "The speed and the signal power of a record are results: a fault may change them. Report "
+    "results with and without RMS normalization.",
+    "A clean split compares scores on machines never seen. Tune on `validation`; use `test` once.",
+)
 
 OTHER_COLUMNS = {
     "start_sample": "first sample of the row in its record",
@@ -110,30 +99,27 @@ class HubConfig:
 
 def hub_card(data: Dataset, configs: Sequence[HubConfig]) -> str:
     """Card as Markdown after front matter, with text from files escaped."""
-    version, origin = escape(data.manifest.generator_version), origin_of(data.manifest)
-    facts = [row for row in set_facts(data) if row[0] not in OF_SHARDS]
     header = ("configuration", "apart in its subsets", *SUBSETS, "records left out")
-    sections = [
-        _front_matter(data, configs),
-        f"# {escape(data.folder.resolve().name)}",
-        f"{origin.made} by gensig {version}, with its splits.",
-        table(("fact", "value"), facts),
-        "## Classes",
-        table(("class", "records", "severity"), class_rows(data)),
-        "## Splits",
-        _split_words(data),
-        table(header, [_split_row(config) for config in configs]),
-        *map(_warnings, configs),
-        "## Load it",
-        LOAD.format(protocol=configs[0].protocol),
-        "## Columns",
-        table(("column", "unit", "role", "meaning"), _column_rows(data, configs)),
-        "## Caveats",
-        f"{origin.caveat}\n{CAVEATS}",
-        "## Licence",
-        origin.license_text,
+    splits = Table(head=header, rows=[_split_row(config) for config in configs])
+    columns = Table(
+        head=("column", "unit", "role", "meaning"), rows=_column_rows(data, configs)
+    )
+    load = LOAD.format(protocol=configs[0].protocol)
+    middle = [
+        Section(title="Splits", text=[_split_words(data)], table=splits),
+        Section(title="", text=[line for one in configs for line in _warnings(one)]),
+        Section(title="Load it", code=load),
+        Section(title="", text=[ONE_PROTOCOL]),
+        Section(title="Columns", table=columns),
     ]
-    return "\n\n".join(section.strip() for section in sections if section) + "\n"
+    return whole_card(
+        data,
+        _front_matter(data, configs),
+        middle,
+        (*origin_of(data.manifest).caveats, *CAVEATS),
+        made=", with its splits",
+        lacking=OF_SHARDS,
+    )
 
 
 def _front_matter(data: Dataset, configs: Sequence[HubConfig]) -> str:
@@ -199,16 +185,14 @@ def _split_row(config: HubConfig) -> tuple[object, ...]:
     return (config.protocol, apart, *rows, config.n_left_out)
 
 
-def _warnings(config: HubConfig) -> str:
-    """Paragraphs on a protocol that leaks, is unknown or cuts records; '' for any other."""
-    words = ""
+def _warnings(config: HubConfig) -> Iterator[str]:
+    """Paragraphs on a protocol that leaks, is unknown or cuts records."""
     if config.protocol not in PROTOCOLS:
-        words += UNCHECKED.format(protocol=config.protocol)
+        yield UNCHECKED.format(protocol=config.protocol)
     elif not is_clean(config.protocol):
-        words += LEAKY.format(protocol=config.protocol)
+        yield LEAKY.format(protocol=config.protocol)
     if config.cut:
-        words += "\n" + STRETCHES.format(protocol=config.protocol)
-    return words
+        yield STRETCHES.format(protocol=config.protocol)
 
 
 def _column_rows(

@@ -1,6 +1,5 @@
 """Creation of a data-set folder: plan, splits and, last, the manifest."""
 
-import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -31,6 +30,7 @@ from gensig.dataset.storage.atomic import (
     at_work,
     cannot_write,
     locked,
+    sha256_text,
     write_text,
 )
 from gensig.dataset.storage.made_together import made_together, remove
@@ -43,7 +43,6 @@ def create_folder(
     config: ConfigContent,
     overrides: Sequence[str],
     plan: Plan,
-    identity: str,
     seed: int,
     generator_version: str,
 ) -> None:
@@ -59,7 +58,6 @@ def create_folder(
     config : dict        resolved configuration, plain values
     overrides : list     what the user typed
     plan : Plan          all records; it fixes the shards
-    identity : str       `identity_hash(config, generator_version)`
     seed : int           root seed, also of the splits
     generator_version : str
 
@@ -69,11 +67,6 @@ def create_folder(
                     refuses, after which nothing new is left
     """
     out = Path(out)
-    if identity != identity_hash(config, generator_version):
-        raise DatasetError(
-            f"identity {identity[:12]} does not belong to this configuration; use "
-            "identity_hash(config, ...)"
-        )
     typed = list(map(str, overrides))
     texts = {
         CONFIG: config_text(config),
@@ -86,14 +79,14 @@ def create_folder(
     manifest = Manifest(
         schema_version=version_of(plan.columns),
         generator_version=generator_version,
-        identity=identity,
+        identity=identity_hash(config, generator_version),
         seed=seed,
         n_records=plan.n_records,
         shards=tuple(
             ShardEntry(name=shard_name(i), rows=rows)
             for i, rows in enumerate(plan.shard_sizes())
         ),
-        files={name: _digest(text) for name, text in texts.items()},
+        files={name: sha256_text(text) for name, text in texts.items()},
         configuration=deciding(config),
         environment=environment(),
     )
@@ -127,7 +120,7 @@ def refuse_used(out: Path) -> None:
     The line says where another process is at work there.
     """
     if out.is_dir():
-        if any(out.iterdir()) and not _is_killed_beginning(out):
+        if _is_used(out):
             raise DatasetError(f"{out} {_contents(out)}")
     elif out.exists() or out.is_symlink():
         raise DatasetError(f"{out} exists and is no folder; choose another out=DIR")
@@ -138,7 +131,7 @@ def _refuse_begun_meanwhile(out: Path) -> None:
 
     What that process does there is not asked, since the question takes this lock.
     """
-    if any(out.iterdir()) and not _is_killed_beginning(out):
+    if _is_used(out):
         raise DatasetError(
             f"{out} is not empty: another process has begun a data set there meanwhile; choose "
             "another out=DIR"
@@ -166,14 +159,17 @@ def _contents(out: Path) -> str:
     )
 
 
-def _is_killed_beginning(out: Path) -> bool:
-    """True for a folder with the note of `create_folder` and files from before its manifest."""
+def _is_used(out: Path) -> bool:
+    """False for an empty folder, and for one with what `create_folder` left where it was killed.
+
+    That is its note, and files from before its manifest.
+    """
     names = {path.name for path in out.iterdir() if not _is_temporary(path)}
-    if not names:  # killed while it wrote the note
-        return all(path.name.startswith(f".{BEGINNING}.") for path in out.iterdir())
+    if not names:  # empty, or killed while it wrote the note
+        return not all(path.name.startswith(f".{BEGINNING}.") for path in out.iterdir())
     parts = [out / part for part in (SHARDS, SPLITS) if part in names]
     inside = [path for part in parts if part.is_dir() for path in part.iterdir()]
-    return (
+    return not (
         BEGINNING in names
         and names <= {BEGINNING, CONFIG, OVERRIDES, PLAN, SHARDS, SPLITS}
         and all(part.is_dir() and not part.is_symlink() for part in parts)
@@ -198,7 +194,3 @@ def _clear(out: Path) -> None:
     )
     for path in paths:
         remove(path)
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,6 +1,5 @@
 """Closing of a data set whose shards are all done."""
 
-import hashlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,13 +13,13 @@ from gensig.dataset.folder.layout import (
     SPLITS,
     manifest_text,
     read_manifest,
-    shard_path,
     write_manifest,
 )
-from gensig.dataset.folder.manifest import RECEIPT_SUFFIX
-from gensig.dataset.storage.atomic import TEMPORARY_SUFFIX, locked
+from gensig.dataset.folder.quick_check import shard_sizes
+from gensig.dataset.storage.atomic import TEMPORARY_SUFFIX, locked, sha256_text
 from gensig.dataset.storage.checksums import write_checksums
 from gensig.dataset.storage.index import write_index
+from gensig.dataset.storage.receipts import RECEIPT_SUFFIX
 from gensig.errors import DatasetError
 
 
@@ -48,13 +47,8 @@ def finalize(out: Path, *, figures: bool = True) -> None:
                 f"{out}: {manifest.n_done} of {len(manifest.shards)} shards are done, "
                 f"{named}{more}; run `gensig resume {out}` first"
             )
-        for i, entry in enumerate(manifest.shards):
-            path = shard_path(out, i)
-            if not path.is_file() or path.stat().st_size != entry.bytes:
-                raise DatasetError(
-                    f"{path} is missing or has not the {entry.bytes} bytes recorded; run `gensig "
-                    f"resume {out}`"
-                )
+        if problems := shard_sizes(out, manifest):
+            raise DatasetError(f"{out}: {problems[0]}; run `gensig resume {out}`")
         _remove_leftovers(out)
         closed = replace(
             manifest,
@@ -64,7 +58,7 @@ def finalize(out: Path, *, figures: bool = True) -> None:
         )
         write_card(out, figures=figures)
         text = manifest_text(closed)
-        write_checksums(out, closed, hashlib.sha256(text.encode()).hexdigest())
+        write_checksums(out, closed, sha256_text(text))
         write_manifest(out, closed)
 
 

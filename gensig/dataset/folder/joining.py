@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from gensig.dataset.folder.layout import (
@@ -22,46 +23,24 @@ IMPLANTS = "implants"  # section of the configuration of a set of implants
 
 
 def joined_folder(
-    out: Path, *, asked: ConfigContent | None = None
-) -> tuple[Manifest, ConfigContent]:
-    """Manifest and configuration of a folder that this gensig may add shards to.
-
-    Parameters
-    ----------
-    out : folder of a data set
-    asked : a configuration that must agree with the folder's in all that decides bits
-
-    Raises
-    ------
-    DatasetError    as `agreed_folder`, and for a plan that is missing or was changed
-    """
-    manifest, config = agreed_folder(out, asked=asked)
-    if not (out / PLAN).is_file():
-        raise DatasetError(
-            f"{out / PLAN} is missing; `gensig resume {out}` makes it again"
-        )
-    if problem := plan_problem(out, manifest):
-        raise DatasetError(
-            f"{out}: {problem}; the plan was changed since the folder was begun: restore it, or "
-            "start a new folder"
-        )
-    return manifest, config
-
-
-def agreed_folder(
-    out: Path, *, asked: ConfigContent | None = None
+    out: Path,
+    *,
+    asked: ConfigContent | None = None,
+    restore: Callable[[Manifest, ConfigContent], None] | None = None,
 ) -> tuple[Manifest, ConfigContent]:
     """Manifest and configuration of a folder that this version and configuration began.
 
     Parameters
     ----------
-    out : folder of a data set; its plan is not looked at
+    out : folder of a data set
     asked : a configuration that must agree with the folder's in all that decides bits
+    restore : makes tables again that are lost, before the plan is looked at
 
     Raises
     ------
     DatasetError    for another version, a configuration that was changed (with the keys that
-                    differ), and a compression whose package is missing
+                    differ), a compression whose package is missing, and a plan that is missing or
+                    was changed
     """
     manifest, config = read_manifest(out), read_config(out)
     if manifest.generator_version != __version__:
@@ -85,6 +64,17 @@ def agreed_folder(
         )
     _check_sections(out / CONFIG, config)
     creation_options(config["dataset"]["compression"])  # its package may be missing
+    if restore is not None:
+        restore(manifest, config)
+    if not (out / PLAN).is_file():
+        raise DatasetError(
+            f"{out / PLAN} is missing; `gensig resume {out}` makes it again"
+        )
+    if problem := plan_problem(out, manifest):
+        raise DatasetError(
+            f"{out}: {problem}; the plan was changed since the folder was begun: restore it, or "
+            "start a new folder"
+        )
     return manifest, config
 
 

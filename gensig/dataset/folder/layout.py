@@ -93,6 +93,10 @@ class ShardEntry:
     bytes: int = 0
     n_failed: int = 0
 
+    def failed(self) -> "ShardEntry":
+        """The entry where the shard could not be made."""
+        return ShardEntry(name=self.name, rows=self.rows, state="failed")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Manifest:
@@ -124,6 +128,11 @@ class Manifest:
     def is_complete(self) -> bool:
         """True when the run was finished and closed."""
         return self.state == "complete"
+
+    @property
+    def shard_sizes(self) -> list[int]:
+        """Number of records of each shard."""
+        return [entry.rows for entry in self.shards]
 
     @property
     def n_done(self) -> int:
@@ -278,7 +287,7 @@ def _holds_manifest(entry: os.DirEntry[str]) -> bool:
 
 
 def _check_manifest(manifest: Manifest) -> None:
-    rows = sum(entry.rows for entry in manifest.shards)
+    rows = sum(manifest.shard_sizes)
     if rows != manifest.n_records or not manifest.shards:
         raise DatasetError(
             f"n_records is {manifest.n_records}, the shards hold {rows}; the manifest is damaged"

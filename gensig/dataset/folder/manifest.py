@@ -21,17 +21,6 @@ from gensig.dataset.schema import SCHEMA_VERSION
 from gensig.dataset.storage.atomic import locked, sha256_file
 from gensig.errors import DatasetError
 
-__all__ = [
-    "deciding",
-    "differing_keys",
-    "identity_hash",
-    "read_manifest",
-    "record_failed_shard",
-    "record_shard",
-    "record_shards",
-    "stored_config",
-]
-
 # These change where and how a data set is made, not one bit of it.
 NOT_IDENTITY = ("out", "executor", "verbosity", FINGERPRINTS)
 # Keys that came after 0.9.0 and their values where they are missing. At that value they are not
@@ -44,7 +33,6 @@ SINCE_0_9 = {
     "quality.run_in_share": 0,
     "mesh.heat_law": "grown",
 }
-RECEIPT_SUFFIX = ".done"
 
 
 def identity_hash(config: ConfigContent, generator_version: str) -> str:
@@ -110,41 +98,17 @@ def _leaves(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return leaves
 
 
-def record_shard(
-    out: Path, shard_index: int, sha256: str, bytes: int, n_failed: int
-) -> None:
-    """Enter a finished shard, already under its final name, in the manifest.
-
-    Local processes may do so at once.
-    """
-    facts = {"sha256": sha256, "bytes": bytes, "n_failed": n_failed}
-    _record(out, {shard_index: facts})
-
-
 def record_shards(out: Path, entries: Mapping[int, ShardEntry]) -> None:
-    """Enter finished shards in the manifest in one go."""
-    _record(out, {index: asdict(entry) for index, entry in entries.items()})
+    """Enter shards in the manifest in one go; local processes may do so at once.
 
-
-def _record(out: Path, facts: Mapping[int, Mapping[str, Any]]) -> None:
-    for index in facts:
-        if not shard_path(out, index).is_file():
+    Finished ones are under their final name already. A data set with a failed one cannot be closed
+    until that is made.
+    """
+    for index, entry in entries.items():
+        if entry.state == "done" and not shard_path(out, index).is_file():
             raise DatasetError(
                 f"{shard_path(out, index)} does not exist; a shard is written before it is recorded"
             )
-    _update(out, {index: {**fact, "state": "done"} for index, fact in facts.items()})
-
-
-def record_failed_shard(out: Path, shard_index: int) -> None:
-    """Enter in the manifest that a shard could not be made.
-
-    The data set cannot be closed until it is.
-    """
-    failed = {"state": "failed", "sha256": "", "bytes": 0, "n_failed": 0}
-    _update(out, {shard_index: failed})
-
-
-def _update(out: Path, changes: Mapping[int, Mapping[str, Any]]) -> None:
     with locked(out):
         manifest = read_manifest(out)
         if manifest.is_complete:
@@ -152,12 +116,12 @@ def _update(out: Path, changes: Mapping[int, Mapping[str, Any]]) -> None:
                 f"{out} is complete and closed; make another data set to change anything"
             )
         shards = list(manifest.shards)
-        for index, change in changes.items():
+        for index, entry in entries.items():
             if not 0 <= index < len(shards):
                 raise DatasetError(
                     f"shard {index} does not exist; {out} has shards 0 to {len(shards) - 1}"
                 )
-            shards[index] = shard_entry(index, {**asdict(shards[index]), **change})
+            shards[index] = shard_entry(index, asdict(entry))
         write_manifest(out, replace(manifest, shards=tuple(shards)))
 
 

@@ -2,7 +2,7 @@
 
 import hashlib
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -36,13 +36,21 @@ def check_opening(folder: Path, manifest: Manifest) -> None:
     ------
     DatasetError    for the first difference
     """
-    problems = unlisted_files(manifest) or _altered_manifest(folder, manifest)
-    if not problems and (problem := plan_problem(folder, manifest)):
-        problems = [problem]
-    if not problems:
-        problems = shard_sizes(folder, manifest)
-    if problems:
-        raise DatasetError(f"{folder}: {problems[0]}; run `gensig verify {folder}`")
+    problem = next(_opening_problems(folder, manifest), "")
+    if problem:
+        raise DatasetError(f"{folder}: {problem}; run `gensig verify {folder}`")
+
+
+def _opening_problems(folder: Path, manifest: Manifest) -> Iterator[str]:
+    yield from unlisted_files(manifest)
+    is_listed = manifest.is_complete and (folder / CHECKSUMS).is_file()
+    if is_listed and read_checksums(folder).get(MANIFEST) != sha256_file(
+        folder / MANIFEST
+    ):
+        yield f"{MANIFEST} was altered: its sha256 is not the one in {CHECKSUMS}"
+    if problem := plan_problem(folder, manifest):
+        yield problem
+    yield from shard_sizes(folder, manifest)
 
 
 def plan_problem(folder: Path, manifest: Manifest) -> str:
@@ -89,22 +97,6 @@ def unlisted_files(manifest: Manifest) -> list[str]:
         for name in needed
         if name not in manifest.files
     ]
-
-
-def _altered_manifest(folder: Path, manifest: Manifest) -> list[str]:
-    path = folder / CHECKSUMS
-    if not manifest.is_complete or not path.is_file():
-        return []
-    if read_checksums(folder).get(MANIFEST) == _digest(folder / MANIFEST):
-        return []
-    return [f"{MANIFEST} was altered: its sha256 is not the one in {CHECKSUMS}"]
-
-
-def _digest(path: Path) -> str:
-    """The sha256 of an ordinary file; '' where there is none."""
-    if not path.is_file():
-        return ""
-    return sha256_file(path)
 
 
 def shard_sizes(folder: Path, manifest: Manifest) -> list[str]:

@@ -53,17 +53,20 @@ class VerifyResult:
 
     Parameters
     ----------
-    complete : bool       True only for a closed data set without any problem
-    problems : list       one line each; empty exactly when `complete`
+    problems : list       one line each; that the data set was never closed is one
     n_records : int       records the data set is meant to have
     n_failed : int        records whose simulation failed; they are no problem, but no silence
                           either
     """
 
-    complete: bool
     problems: list[str]
     n_records: int
     n_failed: int
+
+    @property
+    def complete(self) -> bool:
+        """True only for a closed data set without any problem."""
+        return not self.problems
 
 
 def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
@@ -84,12 +87,9 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
     except DatasetError as error:
         if not (folder / MANIFEST).is_file():
             raise
-        return VerifyResult(
-            complete=False, problems=[str(error)], n_records=0, n_failed=0
-        )
+        return VerifyResult(problems=[str(error)], n_records=0, n_failed=0)
     problems = _unfinished(folder, manifest) + damage(folder, manifest, quick=quick)
     return VerifyResult(
-        complete=not problems,
         problems=problems,
         n_records=manifest.n_records,
         n_failed=manifest.n_failed,
@@ -109,11 +109,11 @@ def damage(folder: Path, manifest: Manifest, *, quick: bool = False) -> list[str
         ]
     plan = None
     if not quick:
-        lines, plan = _tables(folder, manifest)
+        lines, plan = _tables(folder, manifest, n_planned)
         problems += lines
         if plan is not None:
             problems += _splits(folder, manifest, plan)
-    starts = np.cumsum([0, *(entry.rows for entry in manifest.shards)])
+    starts = np.cumsum([0, *manifest.shard_sizes])
     reference: dict | None = None
     for i, entry in enumerate(manifest.shards):
         if entry.state != "done":
@@ -193,7 +193,9 @@ def _extra_files(folder: Path, manifest: Manifest) -> list[str]:
     ]
 
 
-def _tables(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | None]:
+def _tables(
+    folder: Path, manifest: Manifest, n_planned: int
+) -> tuple[list[str], Plan | None]:
     """Plan, configuration, splits and index against the manifest."""
     problems = [
         f"{name} was altered: its sha256 is not the one in the manifest"
@@ -219,7 +221,6 @@ def _tables(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | None]:
             )
     except DatasetError as error:
         problems.append(str(error))
-    n_planned = plan_digest(folder)[1]
     if n_planned > manifest.n_records:  # not read: it may be of any size
         return [*problems, records_problem(n_planned, manifest)], None
     try:
@@ -228,7 +229,7 @@ def _tables(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | None]:
         return [*problems, str(error)], None
     if problem := records_problem(plan.n_records, manifest):
         return [*problems, problem], None
-    if plan.shard_sizes() != [entry.rows for entry in manifest.shards]:
+    if plan.shard_sizes() != manifest.shard_sizes:
         line = f"{PLAN} and the manifest have different shards; one was altered"
         return [*problems, line], None
     return problems, plan

@@ -131,16 +131,16 @@ def _lock(descriptor: int, *, waits: bool) -> bool:
 
 def sync_folder(folder: Path) -> None:
     """Make the names in a folder survive a power cut."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    _sync(folder, os.O_RDONLY)
 
 
 def sync_file(path: Path) -> None:
     """Make the bytes of a file survive a power cut."""
-    descriptor = os.open(path, os.O_RDWR)
+    _sync(path, os.O_RDWR)
+
+
+def _sync(path: Path, flags: int) -> None:
+    descriptor = os.open(path, flags)
     try:
         os.fsync(descriptor)
     finally:
@@ -293,11 +293,16 @@ def link_text(path: Path, part_of: str = DATA_SET) -> str:
 
 def require_digest(path: Path, text: str, sha256: str) -> None:
     """Raise DatasetError for a text that was read from a file and has another sha256."""
-    if hashlib.sha256(text.encode("utf-8")).hexdigest() != sha256:
+    if sha256_text(text) != sha256:
         raise DatasetError(
             f"{path} was altered: its sha256 is not the one in the manifest; restore it from a "
             "copy"
         )
+
+
+def sha256_text(text: str) -> str:
+    """Hexadecimal sha256 of a text as a file holds it."""
+    return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
 def sha256_file(path: Path) -> str:

@@ -1,26 +1,28 @@
 """Receipts of finished shards, which wait beside them for their entry in the manifest.
 
 Processes that may not see each other, such as the tasks of an array job, write separate shards and
-receipts, and so never share a file. One process enters the receipts in the manifest. A shard whose
-writer was killed before its receipt is made again.
+receipts, and so never share a file. One process enters the receipts in the manifest; closing
+removes them. A shard whose writer was killed before its receipt is made again.
 """
 
 import json
-from contextlib import suppress
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
 from gensig.dataset.folder.layout import (
+    Manifest,
     ShardEntry,
     read_manifest,
     shard_entry,
-    shard_name,
     shard_path,
 )
-from gensig.dataset.folder.manifest import RECEIPT_SUFFIX, record_shards
+from gensig.dataset.folder.manifest import record_shards
+from gensig.dataset.folder.quick_check import size_problem
 from gensig.dataset.storage.atomic import read_text, write_text
 from gensig.errors import DatasetError
 
+RECEIPT_SUFFIX = ".done"
 RECEIPT_BYTES_LIMIT = 4096
 
 
@@ -30,56 +32,42 @@ def receipt_path(folder: Path, shard_index: int) -> Path:
     return path.with_name(f".{path.name}{RECEIPT_SUFFIX}")
 
 
-def write_receipt(
-    folder: Path,
-    shard_index: int,
-    *,
-    rows: int,
-    sha256: str,
-    n_bytes: int,
-    n_failed: int,
-) -> None:
+def write_receipt(folder: Path, shard_index: int, entry: ShardEntry) -> None:
     """Write the receipt of a shard that is whole under its final name."""
-    entry = ShardEntry(
-        name=shard_name(shard_index),
-        rows=rows,
-        state="done",
-        sha256=sha256,
-        bytes=n_bytes,
-        n_failed=n_failed,
-    )
     write_text(receipt_path(folder, shard_index), json.dumps(asdict(entry)) + "\n")
 
 
-def read_receipt(folder: Path, shard_index: int) -> ShardEntry | None:
-    """Entry of a shard by its receipt; None without one, or for a shard of another size."""
-    path, shard = receipt_path(folder, shard_index), shard_path(folder, shard_index)
-    if not path.is_file():
-        return None
+def shard_entries(
+    folder: Path, manifest: Manifest, indices: Iterable[int]
+) -> dict[int, ShardEntry]:
+    """Entries of shards by the manifest, and by their receipts where it has none."""
+    return {index: _entry(folder, index, manifest.shards[index]) for index in indices}
+
+
+def _entry(folder: Path, index: int, planned: ShardEntry) -> ShardEntry:
+    """Entry of one shard; a receipt that does not fit its shard counts for nothing."""
+    path = receipt_path(folder, index)
+    if planned.state == "done" or not path.is_file():
+        return planned
     try:
-        entry = shard_entry(
-            shard_index, json.loads(read_text(path, limit=RECEIPT_BYTES_LIMIT))
-        )
+        text = read_text(path, limit=RECEIPT_BYTES_LIMIT)
+        entry = shard_entry(index, json.loads(text))
     except (DatasetError, ValueError, RecursionError):
-        return None  # damaged: the shard is made again
-    if entry.state != "done" or not shard.is_file():
-        return None
-    return entry if shard.stat().st_size == entry.bytes else None
+        return planned  # damaged: the shard is made again
+    fits = (entry.state, entry.rows) == ("done", planned.rows)
+    if not fits or size_problem(shard_path(folder, index), entry):
+        return planned
+    return entry
 
 
-def collect_receipts(folder: Path) -> int:
-    """Enter every shard that has a receipt in the manifest; returns how many there were."""
+def collect_receipts(folder: Path) -> None:
+    """Enter every shard that has a receipt in the manifest."""
     manifest = read_manifest(folder)
-    entries = {}
-    for index, planned in enumerate(manifest.shards):
-        if planned.state != "done":
-            entry = read_receipt(folder, index)
-            if entry is not None and entry.rows == planned.rows:
-                entries[index] = entry
-    if entries:
-        record_shards(folder, entries)
-    if not manifest.is_complete:
-        for index in range(len(manifest.shards)):
-            with suppress(FileNotFoundError):
-                receipt_path(folder, index).unlink()
-    return len(entries)
+    entries = shard_entries(folder, manifest, range(len(manifest.shards)))
+    received = {
+        index: entry
+        for index, entry in entries.items()
+        if entry != manifest.shards[index]
+    }
+    if received:
+        record_shards(folder, received)

@@ -23,6 +23,7 @@ from gensig.dataset.columns import (
     LINE_FAULT_GEAR,
     Column,
 )
+from gensig.dataset.folder.layout import ShardEntry
 from gensig.dataset.schema import (
     DEFAULTS,
     PARAMS,
@@ -185,6 +186,18 @@ class ShardWriter:
                 self._finish()
         finally:
             self._close()
+
+    @property
+    def entry(self) -> ShardEntry:
+        """Entry of the finished shard in the manifest of its data set."""
+        return ShardEntry(
+            name=self.path.name,
+            rows=self.n_records,
+            state="done",
+            sha256=self.sha256,
+            bytes=self.n_bytes,
+            n_failed=self.n_failed,
+        )
 
     def write(
         self,

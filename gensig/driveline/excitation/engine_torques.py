@@ -30,6 +30,8 @@ from gensig.driveline.excitation.line_torques import (
     LineTorques,
     Load,
     Reference,
+    by_node,
+    load_torques,
 )
 from gensig.driveline.excitation.pressure import (
     PressureFile,
@@ -224,7 +226,10 @@ def engine_torques(
             f"the speed of the crank, {speed * 30.0 / math.pi:g} r/min, must be positive"
         )
     share = speed / engine.reference.speed
-    parts = [*_loads(engine, share), *_valve_torques(engine, speed, n_points)]
+    parts = [
+        *load_torques(engine.loads, share),
+        *_valve_torques(engine, speed, n_points),
+    ]
     driven = sum(ratios[node] * float(np.mean(row)) for node, row in parts)
     taken = engine.friction_torque - driven
     plunger_at = partial(_plunger_torque, engine, speed, share, n_points=n_points)
@@ -239,7 +244,7 @@ def engine_torques(
     dynamometer, load_ratio = engine.dynamometer, ratios[engine.dynamometer.node]
     parts.append((dynamometer.node, np.array(-brake / load_ratio)))
     parts += _cylinder_torques(engine, pressure, speed)
-    nodes, torques = _by_node(parts, n_points)
+    nodes, torques = by_node(parts, n_points)
     return EngineTorques(
         speed=speed,
         brake_torque=brake,
@@ -253,17 +258,6 @@ def engine_torques(
         disturbance_torque=dynamometer.disturbance_share * brake / load_ratio,
         disturbance_frequency=dynamometer.disturbance_frequency,
     )
-
-
-def _by_node(
-    parts: list[tuple[int, Array]], n_points: int
-) -> tuple[tuple[int, ...], Array]:
-    """Nodes of some torques in ascending order, and the sum on each, (node, point)."""
-    nodes = tuple(sorted({node for node, _ in parts}))
-    torques = np.zeros((len(nodes), n_points))
-    for node, row in parts:
-        torques[nodes.index(node)] += row
-    return nodes, torques
 
 
 def _check_nodes(engine: Engine, ratios: Mapping[int, float]) -> None:
@@ -284,14 +278,6 @@ def _check_nodes(engine: Engine, ratios: Mapping[int, float]) -> None:
                 f"excitation.{key}: node {node} turns {ratios[node]:.6g} times as "
                 f"fast as the crank; it needs {ratio:g}"
             )
-
-
-def _loads(engine: Engine, speed_share: float) -> list[tuple[int, Array]]:
-    """Mean torques of the driven machines on their nodes."""
-    return [
-        (load.node, np.array(-load.torque * speed_share ** LAWS[load.law]))
-        for load in engine.loads.values()
-    ]
 
 
 def _valve_torques(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,3 +69,24 @@ class LineTorques:
         for node, row in zip(self.nodes, self.torque, strict=True):
             out[line_nodes.index(node)] += row
         return out
+
+
+def load_torques(
+    loads: Mapping[str, Load], speed_share: float
+) -> list[tuple[int, Array]]:
+    """Mean torques of driven machines on their nodes at a share of the reference speed."""
+    return [
+        (load.node, np.array(-load.torque * speed_share ** LAWS[load.law]))
+        for load in loads.values()
+    ]
+
+
+def by_node(
+    parts: list[tuple[int, Array]], n_points: int
+) -> tuple[tuple[int, ...], Array]:
+    """Nodes of some torques in ascending order, and the sum on each, (node, point)."""
+    nodes = tuple(sorted({node for node, _ in parts}))
+    torques = np.zeros((len(nodes), n_points))
+    for node, row in parts:
+        torques[nodes.index(node)] += row
+    return nodes, torques

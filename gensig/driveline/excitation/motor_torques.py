@@ -16,6 +16,8 @@ from gensig.driveline.excitation.line_torques import (
     LineTorques,
     Load,
     Reference,
+    by_node,
+    load_torques,
 )
 from gensig.errors import ConfigError
 
@@ -142,22 +144,14 @@ def motor_torques(
             f"the torque of the load, {torque:g} N m at the motor, must be 0 or more"
         )
     share = speed / drive.reference.speed
-    taken = [
-        (load.node, load.torque * share ** LAWS[load.law])
-        for load in drive.loads.values()
-    ]
-    taken.append((drive.load_node, torque / ratios[drive.load_node]))
-    given = (
-        sum(ratios[node] * value for node, value in taken) / ratios[drive.motor_node]
-    )
+    parts = load_torques(drive.loads, share)
+    parts.append((drive.load_node, np.array(-torque / ratios[drive.load_node])))
+    taken = -sum(ratios[node] * float(row) for node, row in parts)
     wave: Array = np.ones(n_points)
     if drive.ripple is not None:
         wave = wave + drive.ripple.share * np.sin(
             drive.ripple.order * cycle_angles(n_points)
         )
-    nodes = tuple(sorted({drive.motor_node, *(node for node, _ in taken)}))
-    torques = np.zeros((len(nodes), n_points))
-    torques[nodes.index(drive.motor_node)] += given * wave
-    for node, value in taken:
-        torques[nodes.index(node)] -= value
+    given = taken / ratios[drive.motor_node] * wave
+    nodes, torques = by_node([(drive.motor_node, given), *parts], n_points)
     return LineTorques(speed=speed, brake_torque=torque, nodes=nodes, torque=torques)

@@ -15,6 +15,7 @@ from gensig.errors import GeometryError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.life.root.tooth_root import root_loading, root_section
+from gensig.mesh.sliced.slice_energy import structure_deflection
 from gensig.units import check_choice
 
 Array = NDArray[np.float64]
@@ -265,23 +266,12 @@ def spread_along_face(load: Array, structure: Array, coupling: float) -> Array:
     coupling : squared length over which slices couple, over the squared width of a slice; 0
         leaves ``load`` as it is
 
-    The reaction k w of the foundation with shear that the mesh has for its slices, k w - (k
-    coupling w')' = load, k = 1 / structure, w' = 0 at both ends: the sum over the face stays.
-    Thomas's algorithm, whose pivots are positive.
+    The reaction k w of the foundation with shear that the mesh has for its slices, see
+    ``structure_deflection``: the sum over the face stays.
     """
-    if coupling == 0.0 or load.shape[-1] == 1:
-        return load
-    between = 2.0 * coupling / (structure[..., 1:] + structure[..., :-1])
-    pivot, deflection = 1.0 / structure, load.copy()
-    pivot[..., 1:] += between
-    pivot[..., :-1] += between
     n_slices = load.shape[-1]
-    for j in range(1, n_slices):
-        ratio = between[..., j - 1] / pivot[..., j - 1]
-        pivot[..., j] -= ratio * between[..., j - 1]
-        deflection[..., j] += ratio * deflection[..., j - 1]
-    deflection[..., -1] /= pivot[..., -1]
-    for j in range(n_slices - 2, -1, -1):
-        deflection[..., j] += between[..., j] * deflection[..., j + 1]
-        deflection[..., j] /= pivot[..., j]
-    return deflection / structure
+    if coupling == 0.0 or n_slices == 1:
+        return load
+    return (
+        structure_deflection(structure, load, np.ones(n_slices), coupling) / structure
+    )

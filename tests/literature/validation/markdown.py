@@ -29,111 +29,94 @@ COLUMNS = (
 )
 SOURCE_TEXTS = {
     "spur_reference": (
-        "Computed independently of this project (rack geometry, potential-energy method, 2-D "
-        "finite elements, Runge-Kutta records); the sections and tables are those of that "
-        "reference. Bores 9 and 15 mm unless a line says otherwise. Under *gensig's default* "
-        "(`ours_` in the CSV) stands what gensig takes unless told otherwise (short teeth, "
-        "elastic ring, Weber's contact, shared bodies, calibrated crack, plane strain) "
-        "against finite elements; where those are in plane stress, or have the Hertz term, so "
-        "has ours. All other lines have the conventions of the paper: against finite elements "
-        "(`fe_`), which they cannot meet exactly, their tolerance is the band that the "
-        "reference accepts. Records were simulated there with other damping and a prescribed "
-        "phase, so 10 % is accepted."
+        "Computed independently of this project: rack geometry, potential-energy method, 2-D "
+        "finite elements, Runge-Kutta records. Bores are 9 and 15 mm unless a line says "
+        "otherwise. Lines `ours_` have gensig's defaults, in plane stress or with the Hertz term "
+        "where the finite elements have them. All other lines have the paper's conventions; "
+        "against finite elements (`fe_`) their tolerance is the band that the reference accepts. "
+        "Records of the reference have other damping and a prescribed phase, so 10 % is accepted."
     ),
     "spur_paper": (
-        "Yan, Zhang, Feng & Li (2023), gears 23/84 at 1800 r/min. The paper prints few "
-        "numbers: its claims are put as a number and a criterion each, under the paper's own "
-        "mesh law (`paper_law`) and under the one-sided law with all that gensig takes by "
-        "default (`one_sided`). Records are 15 turns of the pinion, perfect teeth, no noise, "
-        "20 N m (assumed), acceleration of the pinion's bearing along the line of action. "
-        "Lines without a criterion show numbers that belong to the claims."
+        "Yan, Zhang, Feng & Li (2023), gears 23/84 at 1800 r/min. Each claim is a number and a "
+        "criterion, under the paper's mesh law (`paper_law`) and by default (`one_sided`). Records "
+        "are 15 turns of the pinion, perfect teeth, no noise, 20 N m (assumed), acceleration of "
+        "the pinion's bearing along the line of action."
     ),
     "helical_reference": (
-        "Computed independently of this project by transverse slices with the "
-        "potential-energy method, Sainsot's body, linear Hertz, bores of half the pitch "
-        "radius, plain sum of pairs, contact on the path only. That model takes the involute "
-        "down to the root circle, and so do these lines, by a rack with a nearly sharp tip "
-        "(cutter_tip_radius_coefficient=0.02); beside them stand a rounded rack and what "
-        "gensig takes by default (`rounded`, `ours`): a root that a rounded rack cuts makes "
-        "teeth stiffer, and contact at the tips' corners carries load beyond the path."
+        "Computed independently of this project: transverse slices, potential-energy method, "
+        "Sainsot's body, linear Hertz, bores of half the pitch radius, plain sum of pairs, "
+        "contact on the path only. The involute goes down to the root circle, so these lines have "
+        "a rack with a nearly sharp tip (cutter_tip_radius_coefficient=0.02). `rounded` has a "
+        "rounded rack, `ours` gensig's defaults."
     ),
     "helical_error_paper": (
         "Liu, Lai, Yue, Xu & Li (2016), gears 61/132, 178 N m. Lines `in_phase` leave out the "
-        "helix of the contact lines, `misaligned` have 5.2 um over the face. No line was "
-        "tuned; the addendum is the one with which the printed contact ratio comes out. For "
-        "the run-up's noise stands the vibration of the bearings at mesh orders 1 to 3, with "
-        "gensig's own mesh."
+        "helix of the contact lines, `misaligned` have 5.2 um over the face. The addendum is the "
+        "one with which the printed contact ratio comes out. For the run-up's noise stands the "
+        "vibration of the bearings at mesh orders 1 to 3, with gensig's own mesh."
     ),
     "helical_heat_paper": (
-        "Gears 40/162, 24.351 kN m; bores of half the pitch radius, an even split of the "
-        "profile shift and the rack's rounding are assumed, the paper prints none of them. "
-        "Hot gears are those of heat=chongqing_rated, whose inputs are assumed as well; "
-        "`true`, `contact_ratio`, `apparent` and `softened` are the effects of heat one by "
-        "one (docs/theory/heat.md), `ours` gensig's own mesh. Lines `paper` have the paper's own "
-        "equations (10) to (29), `mesh.heat_law=paper`, compared with the same equations without "
-        "heat; `paper_components` adds components up as eq. (14) has it; the others are readings "
-        "of what is misprinted or open (docs/theory/heat.md). `uniform_100_k` is the change by "
-        "100 K of both gears. Two lines meet the printed hot mean by their level alone: their "
+        "Gears 40/162, 24.351 kN m. Not printed and assumed: bores of half the pitch radius, an "
+        "even split of the profile shift, the rack's rounding, all inputs of "
+        "heat=chongqing_rated. `true`, `contact_ratio`, `apparent` and `softened` are the effects "
+        "of heat one by one, `ours` is gensig's own mesh. Lines `paper` have the paper's equations "
+        "(10) to (29), compared with the same equations without heat; `paper_components` adds "
+        "components up by eq. (14); the others are readings of what is misprinted or open "
+        "(docs/theory/heat.md). Two lines meet the printed hot mean by their level alone: their "
         "cold means are 12 % and 5 % above the printed one."
     ),
     "engine_root_stress": (
-        "Sun, Shi, Chen, Li & Liu, spur gears 54/54 of module 3, and numbers computed from it "
-        "independently of this project (`reference`, `variants`). The paper prints root "
-        "stresses and safety factors, but neither a force nor any form factor: the force that "
-        "gives its stress is what can be compared. All load factors are 1; rack ISO 53-A is "
-        "assumed."
+        "Sun, Shi, Chen, Li & Liu (2024), spur gears 54/54 of module 3, and numbers computed from "
+        "it independently of this project (`reference`, `variants`). The paper prints neither a "
+        "force nor a form factor, so the force that gives its stress is compared. All load factors "
+        "are 1; rack ISO 53-A is assumed."
     ),
     "engine_reference": (
         "Computed independently of this project from the same tables. `true_ratios` is the "
-        "line as printed with the gears' ratios, `ratios_ignored` takes every mesh for a "
-        "shaft of its printed torsional stiffness, `crank_only` leaves the gear train out, "
-        "`half_ring` counts half of the damper's outer part, as for a viscous damper."
+        "printed line with the gears' ratios, `ratios_ignored` takes every mesh for a shaft of "
+        "its printed torsional stiffness, `crank_only` leaves the gear train out, `half_ring` "
+        "counts half of the damper's outer part, as for a viscous damper."
     ),
     "engine_paper": (
-        "Sun, Shi, Chen, Li & Liu (2024), 67 inertias and 66 stiffnesses as printed in table "
-        "A1, gears as in table B1. Variants as above. No inertia or stiffness is fitted: many "
-        "pairs of changed numbers meet all four frequencies within 0.01 %, so that a close "
-        "fit would be no evidence."
+        "The same paper: 67 inertias and 66 stiffnesses of table A1, gears of table B1, variants "
+        "as above. Nothing is fitted: many pairs of changed numbers meet all four frequencies "
+        "within 0.01 %, so a close fit would be no evidence."
     ),
     "wear_reference": (
         "Computed independently of this project from table 1 of the wear-life paper, whose "
         "equations (1) to (10) are lost: sliding, pressure, and wear of a mesh by the contact "
         "band (Flodin) and by the paper's fixed intervals. A is where the wheel's tip meets "
-        "the pinion's root, C the pitch point, E the pinion's tip. One pair, new flanks; "
-        "`spur`, `full_addendum` and `helical` are what gensig takes by default, with flanks "
-        "that wear and share the load by the loaded mesh."
+        "the pinion's root, C the pitch point, E the pinion's tip. `spur`, `full_addendum` and "
+        "`helical` are gensig's defaults, the other lines one pair with new flanks."
     ),
     "wear_paper": (
-        "Pan, Zhao, Li & Wang (2012), gears 38/55, 200 N m, 4 pi rad/s, in the paper's "
-        "setting: one pair, new flanks, force over the reference radius. The threshold S and "
-        "the number of intervals N_i are not printed; hours are taken for the lives, whose "
-        "unit the paper leaves out."
+        "Pan, Zhao, Li & Wang (2012), gears 38/55, 200 N m, 4 pi rad/s: one pair, new flanks, "
+        "force over the reference radius. The threshold S and the number of intervals N_i are not "
+        "printed; hours are taken for the lives, whose unit the paper leaves out."
     ),
     "engine_response": (
-        "1688 r/min, 12.68 kN m, linear: meshes never part. The paper prints no size, "
-        "pressure, cam, pump or firing order; all are assumed (`excitation=engine_v20`, "
-        "docs/theory/engine.md), none is tuned. Two firing orders: `least_couples` "
-        "of the crank, the default, and `in_sequence`."
+        "1688 r/min, 12.68 kN m, linear: meshes never part. All that the paper does not print is "
+        "assumed (docs/theory/engine.md). Two firing orders: `least_couples` of the crank, the "
+        "default, and `in_sequence`."
     ),
     "engine_dampers": (
-        "The same, with ISO's root stress of the pump gear under the greatest tooth force of "
-        "a cycle, and dampers on both gears of the pump drive, whose sizes the paper does not "
-        "print (docs/theory/engine.md). Waterfalls are steady at every speed, by 10 r/min."
+        "The same, with ISO's root stress of the pump gear under the greatest tooth force of a "
+        "cycle, and dampers of assumed sizes on both gears of the pump drive. Waterfalls are "
+        "steady at every speed, by 10 r/min."
     ),
     "engine_time": (
-        "1688 r/min and 12.68 kN m again, integrated for 2 s with backlash, spur meshes by "
-        "tables of their teeth (docs/theory/engine.md). Numbers are medians over "
-        "28 cycles of the crank. The drive rattles and is chaotic: they scatter by some per "
-        "cent with the last bit, so they are given to two digits (`~`), and 15 % is accepted."
+        "The same, integrated for 2 s with backlash, spur meshes by tables of their teeth. Numbers "
+        "are medians over 28 cycles of the crank. The drive is chaotic: numbers scatter by some "
+        "per cent with the last bit, so they have two digits (`~`), and 15 % is accepted."
     ),
 }
 INTRO = """\
 # Validation
 
-Every printed figure and claim of the sources against what gensig computes. Generated by `gensig
-validate --markdown docs/validation.md`, as are the pages below and the CSV beside each, which has
-every row; do not edit. `tests/literature` checks the same rows; the configuration that each belongs
-to is in `tests/literature/validation/*.csv`.
+Every printed figure and claim of the sources against what gensig computes. `gensig validate
+--markdown docs/validation.md` makes this page, the pages below and the CSV beside each, which has
+every row; do not edit. `tests/literature` checks the same rows; the configuration of each is in
+`tests/literature/validation/*.csv`.
 
 *Reproduced*: within the row's tolerance, or within half a unit of the last printed digit.
 *Differs*: not so, with the reason. A claim *holds* when its number meets the criterion in the
@@ -141,20 +124,22 @@ column "printed". *Not printed*: a number shown beside those that are. No input 
 printed number. `gensig figures` draws the papers' figures beside the printed numbers.
 """
 PEER = (
-    "Another program, ROSS 2.3.0 (`ross-rotordynamics`): with its choices in gensig's functions"
-    " every ratio of compliances and stiffnesses is 1.0000 (one is 1.0001; `python -m "
-    "benchmarks.ross --stored`). Without them the stiffness of one tooth pair 23/84 at C is "
-    "1.0784 of ROSS's by the paper's terms and 0.9998 by default, the mean mesh stiffness "
-    "1.0708 and 0.7792: by default the pairs share the gear bodies, which costs 29 % in double "
-    "contact. The body term differs by theta_f, where ROSS has no clearance, and by the load's "
-    "height, which it measures to the contact point: over finite elements at A, C, E the "
-    "pinion's body compliance is 1.045, 1.172, 1.134 by ROSS and 1.009, 0.987, 0.950 by the "
-    "paper's terms."
+    "Another program, ROSS 2.3.0 (`ross-rotordynamics`; `python -m benchmarks.ross --stored`): with"
+    " its choices in gensig's functions every ratio of compliances and stiffnesses is 1.0000 (one "
+    "is 1.0001). Without them the stiffness of one tooth pair 23/84 at C is 1.0784 of ROSS's by "
+    "the paper's terms and 0.9998 by default, the mean mesh stiffness 1.0708 and 0.7792: by "
+    "default the pairs share the gear bodies, which costs 29 % in double contact. ROSS has no "
+    "clearance in theta_f and measures the load's height to the contact point: over finite "
+    "elements at A, C, E the pinion's body compliance is 1.045, 1.172, 1.134 by ROSS and 1.009, "
+    "0.987, 0.950 by the paper's terms."
 )
 PAGE_INTRO = """\
 Generated; do not edit. How to read it: [validation](../validation.md). All rows:
 [{name}.csv]({name}.csv).
 """
+REASONS_ELSEWHERE = (
+    "Of the lines above; the column `reason` of the CSV has those of all rows."
+)
 
 
 def markdown(results: Sequence[Result]) -> dict[str, str]:
@@ -196,7 +181,11 @@ def _page(name: str, page: Page, results: Sequence[Result]) -> str:
     if page.picture:
         parts.append(f"\n![{page.caption}](../figures/papers/{page.picture})\n")
     parts += ["\n## Headline numbers\n", _table(_headlines(page, results))]
-    parts += ["\n## What differs, and why\n", _wrapped(_reasons(results))]
+    reasons = _reasons(page, results)
+    parts += [
+        "\n## What differs, and why\n",
+        _wrapped([REASONS_ELSEWHERE, "", *reasons]),
+    ]
     parts += ["\n## How it was computed\n"]
     parts += [
         _wrapped([f"- **{name}**: {SOURCE_TEXTS[name]}" for name in page.sources])
@@ -216,15 +205,14 @@ def _headlines(page: Page, results: Sequence[Result]) -> list[Result]:
     return [result for rows in found for result in rows]
 
 
-def _reasons(results: Sequence[Result]) -> list[str]:
-    """Every reason once with the lines that it explains, the one of most rows first."""
+def _reasons(page: Page, results: Sequence[Result]) -> list[str]:
+    """Reasons of the headlines, each once with the lines that it explains."""
     by_reason: dict[str, list[Result]] = {}
-    for result in results:
+    for result in _headlines(page, results):
         if result.verdict in (DIFFERS, FAILS):
             by_reason.setdefault(result.row.reason, []).append(result)
-    ordered = sorted(by_reason.items(), key=lambda item: -len(item[1]))
     lines = []
-    for reason, rows in ordered:
+    for reason, rows in by_reason.items():
         named = ", ".join(f"*{line}*" for line in dict.fromkeys(map(_line, rows)))
         lines.append(f"- {named}: {reason}")
     return lines
@@ -324,8 +312,8 @@ def _table(results: Sequence[Result]) -> str:
         key = _line(result), result.row.unit, result.verdict
         groups.setdefault(key, []).append(result)
     lines = [
-        "| line | at | printed | computed | unit | deviation | verdict |",
-        "|---" * 7 + "|",
+        "| line | at | printed | computed | verdict |",
+        "|---" * 5 + "|",
     ]
     for (line, unit, verdict), members in groups.items():
         rows = [result.row for result in members]
@@ -335,14 +323,14 @@ def _table(results: Sequence[Result]) -> str:
         deviations = [
             result.deviation for result in members if result.deviation is not None
         ]
+        computed = " ".join(_computed(result) for result in members)
+        deviation = _largest(deviations, rough=rows[0].origin in ROUGH)
         cells = [
             line,
             " ".join(row.id.rpartition(".")[2] for row in rows),
             " ".join(printed),
-            " ".join(_computed(result) for result in members),
-            unit,
-            _largest(deviations, rough=rows[0].origin in ROUGH),
-            verdict,
+            f"{computed} {unit}",
+            f"{verdict}, {deviation}" if deviation else verdict,
         ]
         lines.append("| " + " | ".join(cell.strip() for cell in cells) + " |")
     return "\n".join(lines)

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks._realism_results import RECORDING, RESULTS, read_results
 from gensig.report.realism import (
     APART,
     MISSES,
-    RECORDING,
-    RESULTS,
+    OVERLAPS,
     Comparison,
-    read_results,
+    number_text,
     shown_range,
 )
+from gensig.text.markdown import table_lines
 
 WIDTH = 100
 ALL, CHANNELS, SPREAD = "all conditions", "channels", "width"
@@ -60,20 +60,23 @@ def realism_lines(path: Path = RESULTS) -> list[str]:
 
 
 def _part(title: str, text: str, figure: str, rows: Sequence[Comparison]) -> list[str]:
-    """One table of the section with its figure."""
+    """One table of the section with its figure; rows that overlap are counted."""
     if not rows:
         return []
     picture = f"![{title}: simulated beside measured](../figures/realism_{figure}.png)"
-    return ["", f"### {title}", "", *_filled(text), "", picture, "", *_table(rows)]
+    told = [row for row in rows if row.verdict != OVERLAPS]
+    count = f"{len(rows) - len(told)} of {len(rows)} rows overlap; the others:"
+    head = ["", f"### {title}", "", *_filled(text), "", picture, ""]
+    return [*head, count, "", *_table(told)]
 
 
 def _table(rows: Sequence[Comparison]) -> list[str]:
-    lines = [f"| {' | '.join(COLUMNS)} |", "|---" * len(COLUMNS) + "|"]
+    cells = []
     for row in rows:
-        values = f"{_number(row.median)} [{_number(row.p5)}, {_number(row.p95)}]"
-        cells = _name(row), shown_range(row), values, row.verdict
-        lines.append(f"| {' | '.join(cells)} |")
-    return lines
+        middle, *ends = map(number_text, (row.median, row.p5, row.p95))
+        values = f"{middle} [{', '.join(ends)}]"
+        cells.append((_name(row), shown_range(row), values, row.verdict))
+    return table_lines(COLUMNS, cells)
 
 
 def _name(row: Comparison) -> str:
@@ -109,7 +112,3 @@ def _filled(text: str) -> list[str]:
         break_long_words=False,
         break_on_hyphens=False,
     )
-
-
-def _number(value: float) -> str:
-    return "none" if math.isnan(value) else f"{value:.3g}"

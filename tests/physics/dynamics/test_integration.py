@@ -23,7 +23,7 @@ def in_band(acceleration):
 
 
 def test_the_error_falls_with_the_fourth_power_of_the_step(machine, composed_config):
-    """As docs/theory/motion.md tabulates it, against 64 steps a sample."""
+    """As docs/theory/integration.csv tabulates it, against 64 steps a sample."""
 
     def spectrum(steps):
         options = {

@@ -65,7 +65,7 @@ REFUSED = {
     "diagnose trian": "did you mean 'train'?",
     "diagnose generate": "a command of gensig",
     "diagnose train data=x out=y modle=cnn": "did you mean 'model'",
-    "diagnose train data=x out=y model=cnnn": "did you mean 'cnn' or 'wdcnn'?",
+    "diagnose train data=x out=y model=cnnn": "did you mean 'cnn'?",
     "diagnose predict x.csv --modle y": "did you mean '--model'?",
     "diagnose detectability --speeds fast": "give numbers",
     "diagnose adapt --model x --healthy a.csv --method adabn --out y": "removed in 0.15",

@@ -12,7 +12,7 @@ import sys
 import time
 
 import pytest
-from small_sets import TINY, contents, make
+from small_sets import TINY, contents, make, resume
 
 import gensig
 from gensig.cli import main
@@ -70,10 +70,6 @@ def outcome(out, change, **options):
         lines = [str(error)]
     assert not any("\n" in line for line in lines)
     return lines
-
-
-def resume(out):
-    return main(["resume", "--quiet", str(out), "--workers", "1"])
 
 
 def same_bits(out, reference):

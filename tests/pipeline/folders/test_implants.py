@@ -6,7 +6,7 @@ import shutil
 
 import numpy as np
 import pytest
-from small_sets import contents
+from small_sets import contents, resume
 
 import gensig
 from diagnose.cli import main as diagnose
@@ -205,10 +205,6 @@ def torn(made, place):
     for name in ("index.h5", "README.md", "SHA256SUMS"):
         (place / name).unlink()
     return place
-
-
-def resume(out):
-    return main(["resume", "--quiet", str(out), "--workers", "1"])
 
 
 def test_resume_finishes_a_killed_run_with_the_bytes_of_an_undisturbed_one(made, torn):

@@ -7,7 +7,7 @@ import signal
 
 import filelock
 import pytest
-from small_sets import TINY, contents, make
+from small_sets import TINY, contents, make, resume
 
 from gensig.cli import main
 from gensig.dataset.folder.layout import SHARDS
@@ -36,9 +36,9 @@ def test_a_second_run_is_refused_and_the_set_is_whole_after_the_first(
     frozen, tmp_path, capsys
 ):
     with at_work(frozen / SHARDS, others=False):
-        refused(capsys, frozen, "resume", "--quiet", "-j", "1", str(frozen))
+        refused(capsys, frozen, "resume", str(frozen))
         refused(capsys, frozen, "generate", "--quiet", *TASKS, f"out={frozen}")
-    assert main(["resume", "--quiet", "-j", "1", str(frozen)]) == 0
+    assert resume(frozen) == 0
     assert verify(frozen).problems == []
     assert contents(frozen) == contents(make(tmp_path / "plain"))
 
@@ -58,11 +58,11 @@ def test_the_lock_of_a_killed_run_counts_for_nothing(frozen, capsys, others):
     run.start()
     assert begun.wait(60)
     assert len(list(shards.iterdir())) == int(others)
-    refused(capsys, frozen, "resume", "--quiet", "-j", "1", str(frozen))
+    refused(capsys, frozen, "resume", str(frozen))
 
     os.kill(run.pid, signal.SIGKILL)
     run.join()
-    assert main(["resume", "--quiet", "-j", "1", str(frozen)]) == 0
+    assert resume(frozen) == 0
     assert verify(frozen).problems == []
     assert not [path for path in shards.iterdir() if path.name.startswith(".")]
 
@@ -80,7 +80,7 @@ def test_a_system_without_locks_locks_nothing(frozen, monkeypatch):
 
     monkeypatch.setattr(filelock, "lock_descriptor", refuse)
     with at_work(frozen / SHARDS, others=False), at_work(frozen / SHARDS, others=True):
-        assert main(["resume", "--quiet", "-j", "1", str(frozen)]) == 0
+        assert resume(frozen) == 0
     assert verify(frozen).problems == []
 
 

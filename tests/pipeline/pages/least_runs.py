@@ -41,7 +41,6 @@ TRAINING: Values = {
     "epoch_fraction": "0.05",
     "n_bootstrap": "20",
     "n_threads": "1",
-    "minirocket_features": "84",
 }
 # what the words of a command may say otherwise
 QUIET: Values = {

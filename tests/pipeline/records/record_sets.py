@@ -12,15 +12,25 @@ from gensig.record.inputs import InputReader
 from gensig.record.simulate import forget_twins, simulate_records
 
 
+def rows_of(config):
+    plan = make_plan(config)
+    return [plan.record(place) for place in range(plan.n_records)]
+
+
+def simulated(config, rows=None, *, sham=False):
+    """Records of rows of a plan, those of the configuration's own by default."""
+    forget_twins()
+    reader = InputReader(config.with_keys("plan", sham=sham))
+    return simulate_records(reader, rows or rows_of(config))
+
+
 @lru_cache(maxsize=32)
 def records(*overrides):
     """Configuration, rows and records of a small plan; not to be changed."""
     small = ("plan.n_records=4", "plan.classes=[healthy,missing_tooth]")
     config = read_request([*small, *overrides]).config
-    plan = make_plan(config)
-    rows = [plan.record(place) for place in range(plan.n_records)]
-    forget_twins()
-    return config, rows, simulate_records(InputReader(config), rows)
+    rows = rows_of(config)
+    return config, rows, simulated(config, rows)
 
 
 def run(*words):

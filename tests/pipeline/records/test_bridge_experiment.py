@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 import pytest
+from record_sets import rows_of
 
 import gensig
 from diagnose.cli import main as diagnose_main
-from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 
 DRAWN = (
@@ -37,8 +37,7 @@ SMALL = (
 
 
 def test_its_plan_draws_what_it_says_alike_for_all_classes_of_a_condition():
-    plan = make_plan(read_request(["experiment=bridge"]).config)
-    rows = [plan.record(index) for index in range(plan.n_records)]
+    rows = rows_of(read_request(["experiment=bridge"]).config)
     examples = [row for row in rows if row["is_reference"] == 0]
     assert len(examples) == 400
     assert len(rows) - len(examples) == 2 * len({row["unit_id"] for row in rows})

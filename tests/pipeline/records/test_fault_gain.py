@@ -5,15 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from record_sets import run
+from record_sets import run, simulated
 
 import gensig
-from gensig.errors import ConfigError, SimulationError
-from gensig.plan.make import make_plan
+from gensig.errors import ConfigError
 from gensig.plan.request import read_request
 from gensig.record import inputs
-from gensig.record.inputs import InputReader
-from gensig.record.simulate import Record, forget_twins, simulate_records
+from gensig.record.simulate import Record
 
 SMALL = (
     "experiment=quickstart",
@@ -39,11 +37,7 @@ SOURCE, CLEAN, NOISY = "acceleration_source", "acceleration_clean", "acceleratio
 def records(*words: str, gain: float | None = None, sham: bool = False) -> list[Record]:
     if gain is not None:
         words = (*words, f"sensing.fault_gain={gain}")
-    config = read_request(list(words)).config
-    plan = make_plan(config)
-    forget_twins()
-    rows = [plan.record(index) for index in range(plan.n_records)]
-    return simulate_records(InputReader(config.with_keys("plan", sham=sham)), rows)
+    return simulated(read_request(list(words)).config, sham=sham)
 
 
 def is_healthy(record: Record) -> bool:
@@ -101,15 +95,8 @@ def test_gain_zero_is_the_machine_without_its_faults() -> None:
             assert_array_equal(twin.signals[name], silent.signals[name])
 
 
-def test_a_record_whose_twin_fails_is_marked_so(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    whole = inputs.simulate_with_lead_in
-
-    def last_fails(runs: list) -> list:
-        return [*whole(runs)[:-1], SimulationError("the motion grew without bound")]
-
-    monkeypatch.setattr(inputs, "simulate_with_lead_in", last_fails)
+@pytest.mark.usefixtures("last_fails")
+def test_a_record_whose_twin_fails_is_marked_so() -> None:
     made = records(*SMALL, gain=2.0)
     (failed,) = [each for each in made if each.values.get("status") == "failed"]
     assert not is_healthy(failed)

@@ -5,16 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from record_sets import run
+from record_sets import rows_of, run, simulated
+from refusals import refused
 from small_sets import make
 
 import gensig
-from gensig.errors import ConfigError, SimulationError
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.record import inputs
-from gensig.record.inputs import InputReader
-from gensig.record.simulate import forget_twins, simulate_records
 from gensig.record.streams import Stream, stream
 
 SWITCH = "dataset.store_healthy_twin=true"
@@ -40,16 +37,8 @@ REALISTIC = (
 )
 
 
-def plan_of(*overrides: str) -> tuple:
-    config = read_request(list(overrides)).config
-    plan = make_plan(config)
-    return config, [plan.record(index) for index in range(plan.n_records)]
-
-
 def records(*overrides: str, sham: bool = False) -> list:
-    config, rows = plan_of(*overrides)
-    forget_twins()
-    return simulate_records(InputReader(config.with_keys("plan", sham=sham)), rows)
+    return simulated(read_request(list(overrides)).config, sham=sham)
 
 
 @pytest.fixture(scope="module")
@@ -114,25 +103,18 @@ def test_with_the_source_stored_it_is_known_at_the_bearings() -> None:
 def test_a_record_and_its_twin_are_the_same_alone_and_among_others(
     realistic: list,
 ) -> None:
-    config, rows = plan_of(*REALISTIC)
+    config = read_request(list(REALISTIC)).config
+    rows = rows_of(config)
     for index in (3, 0):
-        forget_twins()
-        (alone,) = simulate_records(InputReader(config), [rows[index]])
+        (alone,) = simulated(config, [rows[index]])
         assert {"tacho", "encoder_angle", "healthy_twin"} <= set(alone.signals)
         for name, values in alone.signals.items():
             assert_array_equal(values, realistic[index].signals[name])
         np.testing.assert_equal(alone.values, realistic[index].values)
 
 
-def test_a_twin_that_does_not_stay_finite_fails_its_record(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    whole = inputs.simulate_with_lead_in
-
-    def last_fails(runs: list) -> list:
-        return [*whole(runs)[:-1], SimulationError("the motion grew without bound")]
-
-    monkeypatch.setattr(inputs, "simulate_with_lead_in", last_fails)
+@pytest.mark.usefixtures("last_fails")
+def test_a_twin_that_does_not_stay_finite_fails_its_record() -> None:
     made = records(*SMALL)
     (failed,) = [record for record in made if record.values.get("status") == "failed"]
     assert failed.values["label_name"] != "healthy"
@@ -164,5 +146,5 @@ def test_its_draws_have_a_stream_of_their_own() -> None:
 
 @pytest.mark.parametrize("name", ["healthy_twin", "mesh_state", "tacho"])
 def test_a_switch_is_true_or_false(name: str) -> None:
-    with pytest.raises(ConfigError, match=f"dataset.store_{name} = 1 must be true or"):
+    with refused(f"dataset.store_{name} = 1 must be true or"):
         make_plan(read_request([f"dataset.store_{name}=1"]).config)

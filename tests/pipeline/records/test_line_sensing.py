@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from record_sets import rows_of, simulated
 
-from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.inputs import InputReader
 from gensig.record.machines import read_machine
-from gensig.record.simulate import forget_twins, simulate_records
 from gensig.signals.tacho import pulse_times
 from gensig.systems.nuisances import with_nuisances
 from gensig.systems.run import CleanRecord
@@ -33,11 +32,9 @@ TURN = 2.0 * np.pi
 
 def made(*words):
     """Machine, rows and records of a small set, by class."""
-    forget_twins()
     config = read_request([*SHORT, *words]).config
-    plan = make_plan(config)
-    rows = [plan.record(number) for number in range(plan.n_records)]
-    records = simulate_records(InputReader(config), rows)
+    rows = rows_of(config)
+    records = simulated(config, rows)
     assert not any("status" in record.values for record in records)  # none failed
     names = [row["label_name"] for row in rows]
     return read_machine(config), dict(zip(names, records, strict=True))
@@ -72,9 +69,8 @@ def test_every_bearing_shakes_the_housing_and_nuisances_add_to_every_class():
 def test_no_class_of_a_line_has_other_nuisances():
     """At the same angle of the shaft a faulty line and a sound one are shaken by the same bits."""
     config = read_request([*SHORT, "sensing=geared_line_machine"]).config
-    plan, reader = make_plan(config), InputReader(config)
-    rows = [plan.record(number) for number in range(plan.n_records)]
-    (faulty,) = [row for row in rows if row["label_name"] == "missing_tooth"]
+    reader = InputReader(config)
+    (faulty,) = [row for row in rows_of(config) if row["label_name"] == "missing_tooth"]
     system = reader.inputs(faulty).machine
     sensing = system.sensing
     n_samples = 7680

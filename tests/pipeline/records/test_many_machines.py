@@ -6,6 +6,7 @@ import shutil
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 
 import gensig
 from gensig.cli import main
@@ -80,9 +81,7 @@ def test_teeth_of_records(many, one):
     assert all(len(set(teeth[units == unit])) == 1 for unit in set(units))
     assert one.n_teeth("wheel").tolist() == [84, 84]
     for data in (many, one):
-        with pytest.raises(
-            DatasetError, match="neither a column nor an attribute n_teeth_motor"
-        ):
+        with refused("neither a column nor an attribute n_teeth_motor", DatasetError):
             data.n_teeth("motor")
 
 
@@ -94,7 +93,7 @@ def test_a_stream_has_the_same_bits_and_teeth(many):
     for index, record in zip(examples.tolist(), stream, strict=True):
         assert_array_equal(record.signals["acceleration"], many.signals(index))
     assert gensig.stream(*ONE).n_teeth("pinion").tolist() == [23, 23]
-    with pytest.raises(DatasetError, match="there are pinion, wheel"):
+    with refused("there are pinion, wheel", DatasetError):
         gensig.stream(*ONE).n_teeth("motor")
 
 
@@ -108,7 +107,7 @@ def test_cards_give_the_range_of_the_designs(many):
     text = (many.folder / "README.md").read_text()
     teeth = many.n_teeth("pinion")
     assert "| designs of gears | 4 |" in text
-    assert f"| n\\_teeth\\_pinion | {teeth.min()} to {teeth.max()} |" in text
+    assert f"| n_teeth_pinion | {teeth.min()} to {teeth.max()} |" in text
     biases = json.loads((many.folder / "croissant.json").read_text())["rai:dataBiases"]
     assert any("in 4 designs: " in line for line in biases)
 
@@ -130,7 +129,7 @@ def test_a_manifest_of_another_version_is_refused(many, tmp_path):
     path.write_text(
         path.read_text().replace('"schema_version": 2', '"schema_version": 1')
     )
-    with pytest.raises(DatasetError, match=r"manifest\.json was altered"):
+    with refused("manifest.json was altered", DatasetError):
         gensig.open_dataset(folder)
     problems = verify(folder).problems
     assert any("has format version 2, the manifest says 1" in line for line in problems)

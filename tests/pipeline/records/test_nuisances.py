@@ -5,11 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from record_sets import rows_of, simulated
 
-from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.inputs import InputReader, simulate_motions
-from gensig.record.simulate import forget_twins, simulate_records
 from gensig.systems import nuisances
 from gensig.systems.nuisances import nuisance_acceleration, with_nuisances
 from gensig.systems.run import CleanRecord
@@ -42,19 +41,9 @@ def still(shaking):
     return shaking.with_keys("sensing", nuisances=[])
 
 
-def rows_of(config):
-    plan = make_plan(config)
-    return [plan.record(place) for place in range(plan.n_records)]
-
-
-def made(config):
-    forget_twins()
-    return simulate_records(InputReader(config), rows_of(config))
-
-
 @pytest.fixture(scope="module")
 def both(shaking, still):
-    return made(shaking), made(still)
+    return simulated(shaking), simulated(still)
 
 
 def added(one, other, name):
@@ -145,8 +134,8 @@ def test_any_nuisance_may_be_alone_at_any_sensor(kind, place):
     base = ["plan.n_records=1", "operating.duration_s=0.05", f"sensing={place}"]
     config = read_request(base).config
     alone = config.with_keys("sensing", nuisances=[NUISANCES[kind]])
-    (record,) = made(alone)
-    (without,) = made(config)
+    (record,) = simulated(alone)
+    (without,) = simulated(config)
     assert record.values.get("status") != "failed"
     assert np.any(added(record, without, "acceleration"))
 

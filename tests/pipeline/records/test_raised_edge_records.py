@@ -4,12 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from record_sets import refused, run
+from record_sets import refused, run, simulated
 
-from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.record.inputs import InputReader
-from gensig.record.simulate import forget_twins, simulate_records
 from gensig.signals.indicators import kurtosis, rms
 
 PINION_Y = 1
@@ -28,12 +25,7 @@ FEW = ("fault.tooth=[0,1,2]", "fault.damage=1", "operating.duration_s=0.05")
 
 def record(*overrides, sham=False):
     config = read_request([*SMALL, *overrides]).config
-    plan = make_plan(config)
-    forget_twins()
-    (made,) = simulate_records(
-        InputReader(config.with_keys("plan", sham=sham)), [plan.record(0)]
-    )
-    return made
+    return simulated(config, sham=sham)[0]
 
 
 def along_the_line(*overrides, sham=False):

@@ -8,7 +8,7 @@ import numpy as np
 from gensig.dataset.folder.beginning import create_folder
 from gensig.dataset.folder.closing import finalize
 from gensig.dataset.folder.layout import shard_path
-from gensig.dataset.folder.manifest import identity_hash, record_shard
+from gensig.dataset.folder.manifest import identity_hash, record_shards
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.plan import Plan, record_ids, shard_rows
 from gensig.dataset.splitting.splits import SUBSETS
@@ -199,18 +199,17 @@ def build(
     are those of an older version.
     """
     config = CONFIG | {"seed": seed}
-    identity = identity_hash(config, "0.1.0")
     create_folder(
         out,
         config=config,
         overrides=[f"seed={seed}"],
         plan=plan,
-        identity=identity,
         seed=seed,
         generator_version="0.1.0",
     )
     for shard in shards if shards is not None else range(plan.n_shards):
         if labelled:
+            identity = identity_hash(config, "0.1.0")
             storage["attributes"] = ATTRIBUTES | {"identity": identity}
             storage["shard_index"] = shard
         writer = write_shard(
@@ -222,7 +221,7 @@ def build(
             twin=twin,
             **storage,
         )
-        record_shard(out, shard, writer.sha256, writer.n_bytes, writer.n_failed)
+        record_shards(out, {shard: writer.entry})
     if close:
         finalize(out, figures=figures)
     return out

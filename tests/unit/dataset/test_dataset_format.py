@@ -38,8 +38,11 @@ def test_every_data_set_is_described_in_a_row_of_its_own():
         if column.name in SCALES:
             kind = " or ".join(SAMPLE_TYPES)
         name = f"`{column.name}`{' *' * (column.name in REQUIRED)}"
-        shape = ", ".join(("record", *column.axes))
-        cells = (name, f"({shape})", kind, column.unit, column.role, column.description)
+        if column.axes:
+            kind = f"({', '.join(('record', *column.axes))}) {kind}"
+        if column.unit not in ("", "1"):
+            kind += f", {column.unit}"
+        cells = (name, kind, column.role, column.description)
         rows.append(f"| {' | '.join(cells)} |")
     result = re.search(
         r"<!-- columns:.*?-->\n.*?\n.*?\n(.*)\n.*?\n<!-- end", TEXT, re.DOTALL

@@ -1,13 +1,13 @@
 """Reading of data sets in plan order, from several processes, finished or not."""
 
 import pickle
-import re
 import sys
 
 import numpy as np
 import pytest
 from dataset_samples import CLASSES, build, row_of
 from numpy.testing import assert_array_equal
+from refusals import refused
 
 import gensig.dataset.shard_files as shard_files
 from gensig.dataset.reader import open_dataset
@@ -104,15 +104,13 @@ def test_a_data_frame_has_the_columns_and_the_numbers_of_the_records(data):
     part = data.where(label=2).to_pandas(["label_name", "params/crack_depth_mm"])
     assert part.index.tolist() == data.where(label=2).index.tolist()
     assert part.columns.tolist() == ["label_name", "params/crack_depth_mm"]
-    with pytest.raises(
-        DatasetError, match="'noise_power' holds several values a record"
-    ):
+    with refused("'noise_power' holds several values a record", DatasetError):
         data.to_pandas(["noise_power"])
 
 
 def test_without_pandas_it_says_what_to_install(data, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(DatasetError, match=re.escape(install("pandas"))):
+    with refused(install("pandas"), DatasetError):
         data.to_pandas()
 
 
@@ -145,14 +143,13 @@ def test_mistakes_are_one_line(data):
         lambda: data.signals(0, name="acceleration_clean"),
         lambda: data.signals(0, name="label"),
     ):
-        with pytest.raises(DatasetError) as caught:
+        with refused("", DatasetError):
             call()
-        assert "\n" not in str(caught.value)
 
 
 def test_incomplete_set_is_refused_unless_asked_for(tmp_path, plan):
     folder = build(tmp_path / "a", plan, shards=range(1, 3), close=False, failed=12)
-    with pytest.raises(DatasetError, match="2 of 4 shards are done"):
+    with refused("2 of 4 shards are done", DatasetError):
         open_dataset(folder)
     with open_dataset(folder, allow_incomplete=True) as data:
         assert data.usable.tolist() == [10 <= i < 30 and i != 12 for i in range(36)]
@@ -165,7 +162,7 @@ def test_incomplete_set_is_refused_unless_asked_for(tmp_path, plan):
         with pytest.raises(DatasetError, match=missing):
             data.signals(0)
     empty = build(tmp_path / "b", plan, shards=range(0), close=False)
-    with pytest.raises(DatasetError, match="no finished shard"):
+    with refused("no finished shard", DatasetError):
         open_dataset(empty, allow_incomplete=True)
 
 

@@ -34,7 +34,7 @@ def test_an_id_without_a_number_is_one_line(name, text):
     "text", ["", "no", "{}", "null", "[[]]", '["crack"]', "[" * 4000]
 )
 def test_faults_that_are_no_list_of_mappings_are_one_line(text):
-    with pytest.raises(DatasetError, match="is no list of faults"):
+    with refused("is no list of faults", DatasetError):
         row_faults({"faults_json": text})
     assert row_faults({"faults_json": "[]"}) == []
 

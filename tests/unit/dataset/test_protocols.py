@@ -211,8 +211,13 @@ def test_why_is_precise():
     assert "healthy_only" not in reasons
 
 
-def test_each_protocol_draws_from_its_own_stream():
-    plan = random_plan(7, n_units=24, n_classes=4, n_records=384)
+@pytest.fixture(scope="module")
+def plan():
+    """A plan that has every protocol."""
+    return random_plan(7, n_units=24, n_classes=4, n_records=384)
+
+
+def test_each_protocol_draws_from_its_own_stream(plan):
     assert len({protocol.stream for protocol in PROTOCOLS.values()}) == len(PROTOCOLS)
     first, same, other = (
         {name: table.to_csv() for name, table in make_splits(plan, seed).items()}
@@ -232,8 +237,7 @@ def moved(table, row, **change):
     )
 
 
-def test_the_check_finds_what_is_on_two_sides():
-    plan = random_plan(7, n_units=24, n_classes=4, n_records=384)
+def test_the_check_finds_what_is_on_two_sides(plan):
     tables = make_splits(plan, 1)
     table, leaky = tables["by_unit"], tables["random_window_leaky"]
     train = int(np.flatnonzero(table.subset == "train")[0])
@@ -253,8 +257,7 @@ def test_the_check_finds_what_is_on_two_sides():
     assert "given twice" in split_problems("random_window_leaky", twice, plan)[0]
 
 
-def test_every_record_has_its_own_windows_in_every_subset_of_the_leaky_split():
-    plan = random_plan(7, n_units=24, n_classes=4, n_records=384)
+def test_every_record_has_its_own_windows_in_every_subset_of_the_leaky_split(plan):
     leaky = make_splits(plan, 0)["random_window_leaky"]
     subset = leaky.subset.reshape(plan.n_records, -1)
     counts = np.array([(subset == name).sum(axis=1) for name in SUBSETS])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from dataset_samples import build, forge, make_plan, setting, trust
 from numpy.testing import assert_array_equal
+from refusals import refused
 
 from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.folder.verify import verify
@@ -41,11 +42,10 @@ def swap(folder, one, other):
     second.write_bytes(kept)
 
 
-def refused(folder, record):
+def first_reading(folder, record):
     """The line with which the first reading of a record is refused."""
-    with open_dataset(folder) as data, pytest.raises(DatasetError) as caught:
+    with open_dataset(folder) as data, refused("", DatasetError) as caught:
         data.signals(record)
-    assert "\n" not in str(caught.value)
     return str(caught.value)
 
 
@@ -62,21 +62,21 @@ def test_another_check_is_refused(folder):
 
 def test_swapped_shards_are_noticed_on_the_first_read(folder, labelled):
     swap(folder, 1, 2)
-    line = refused(folder, 10)
+    line = first_reading(folder, 10)
     text = "it is swapped: it says that it is shard 2" if labelled else "first record"
     assert "shard-00001.h5" in line
     assert text in line
     with open_dataset(folder) as data:
         data.signals(0)  # the others are whole
         copy = pickle.loads(pickle.dumps(data))
-    with pytest.raises(DatasetError, match=r"shard-00001\.h5"):
+    with refused("shard-00001.h5", DatasetError):
         copy.signals(19)
 
 
 def test_a_zeroed_shard_is_noticed_on_the_first_read(folder):
     path = shard_path(folder, 3)
     path.write_bytes(bytes(path.stat().st_size))
-    assert "shard-00003.h5 cannot be read" in refused(folder, 35)
+    assert "shard-00003.h5 cannot be read" in first_reading(folder, 35)
 
 
 def test_a_shard_of_another_set_is_noticed_on_the_first_read(new_folder, tmp_path):
@@ -84,7 +84,7 @@ def test_a_shard_of_another_set_is_noticed_on_the_first_read(new_folder, tmp_pat
     path = shard_path(new_folder, 2)
     path.write_bytes(shard_path(other, 2).read_bytes())
     assert path.stat().st_size == shard_path(new_folder, 1).stat().st_size
-    assert "is of another data set" in refused(new_folder, 25)
+    assert "is of another data set" in first_reading(new_folder, 25)
     problems = "\n".join(verify(new_folder).problems)
     assert "shard-00002.h5 was altered" in problems
 
@@ -104,7 +104,7 @@ def test_foreign_labels_are_noticed_though_every_digest_fits(
         file[part].attrs.modify(name, value)
 
     assert text in forge(new_folder, 2, relabel)
-    assert text in refused(new_folder, 25)
+    assert text in first_reading(new_folder, 25)
 
 
 def test_a_shard_without_a_label_among_others_that_have_one_is_refused(new_folder):
@@ -112,7 +112,7 @@ def test_a_shard_without_a_label_among_others_that_have_one_is_refused(new_folde
         del file.attrs["identity"], file["record_id"].attrs["shard_index"]
 
     forge(new_folder, 2, unlabel)
-    assert "another version than the other shards" in refused(new_folder, 25)
+    assert "another version than the other shards" in first_reading(new_folder, 25)
 
 
 def test_a_shard_that_changes_while_it_is_open_is_checked_again(new_folder):
@@ -146,9 +146,8 @@ def lengthened(path):
 )
 def test_noticed_on_opening(folder, name, change, text):
     change(folder / name)
-    with pytest.raises(DatasetError, match=text) as caught:
+    with refused(text, DatasetError):
         open_dataset(folder)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_set_without_checksums_is_opened(folder):
@@ -162,7 +161,7 @@ def test_an_altered_split_is_noticed_when_it_is_read(folder):
     path.write_text(path.read_text().replace(",test", ",train"))
     with open_dataset(folder) as data:
         data.split("random_window_leaky")
-        with pytest.raises(DatasetError, match=r"by_unit\.csv was altered"):
+        with refused("by_unit.csv was altered", DatasetError):
             data.split("by_unit")
         trust(folder)
     with open_dataset(folder) as data:
@@ -172,7 +171,7 @@ def test_an_altered_split_is_noticed_when_it_is_read(folder):
 def test_a_plan_that_changes_after_opening_is_noticed_when_it_is_read(folder):
     with open_dataset(folder) as data:
         lengthened(folder / "plan.csv")
-        with pytest.raises(DatasetError, match=r"plan\.csv was altered"):
+        with refused("plan.csv was altered", DatasetError):
             _ = data.plan
 
 
@@ -186,7 +185,7 @@ def test_one_bit_of_a_sample_is_noticed_by_the_full_check_only(folder):
     assert path.stat().st_size == size
     with open_dataset(folder) as data:
         assert (data.signals(25) != before).sum() == 1
-    with pytest.raises(DatasetError, match=r"NOT whole: shard-00002\.h5 was altered"):
+    with refused("NOT whole: shard-00002.h5 was altered", DatasetError):
         open_dataset(folder, check="full")
 
 
@@ -197,7 +196,7 @@ def test_the_full_check_of_an_interrupted_set_looks_at_what_is_made(tmp_path):
         assert data.usable.sum() == 20
     with h5py.File(shard_path(folder, 1), "r+") as file:
         setting("acceleration", (0, 0, 0), 5.0)(file)
-    with pytest.raises(DatasetError, match=r"shard-00001\.h5 was altered"):
+    with refused("shard-00001.h5 was altered", DatasetError):
         open_dataset(folder, **options)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from dataset_samples import build, row_of, write_shard
 from numpy.testing import assert_array_equal
+from refusals import refused
 
 import gensig.dataset.reader as reader_module
 import gensig.dataset.shard_files as shard_files
@@ -112,10 +113,9 @@ def test_plan_is_a_structured_table(data, plan):
 def test_mistakes_have_a_hint(folder, conditions, message):
     with (
         open_dataset(folder) as data,
-        pytest.raises(DatasetError, match=message) as caught,
+        refused(message, DatasetError),
     ):
         data.where(**conditions)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_shard_is_checked_again_only_when_it_changed(folder, plan, monkeypatch):
@@ -138,7 +138,7 @@ def test_a_shard_is_checked_again_only_when_it_changed(folder, plan, monkeypatch
         assert checks == [shard_path(folder, 1)]
         data.close()
         shard_path(folder, 1).write_bytes(b"no hdf5")
-        with pytest.raises(DatasetError, match=r"shard-00001\.h5"):
+        with refused("shard-00001.h5", DatasetError):
             data.signals(10)
 
 

@@ -31,7 +31,6 @@ def source():
         task=task,
         protocol="by_unit",
         features="basic",
-        minirocket_features=168,
         windows=lambda: sets,
         caches={},
     )
@@ -181,7 +180,7 @@ def study(tmp_path_factory):
     out = tmp_path_factory.mktemp("study") / "out"
     rivals = f"baselines=[{','.join(baseline_names(Role.RIVAL))}]"
     words = ["sham=sham", "oracle=auto", "metadata_probe=true", "epochs=1"]
-    train(sets, out, rivals, "minirocket_features=168", *words)
+    train(sets, out, rivals, *words)
     return out
 
 

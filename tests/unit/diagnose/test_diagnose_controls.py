@@ -100,9 +100,9 @@ def test_the_better_one_on_validation_units_is_the_oracle():
             method=method,
             seed=seed,
             record=record[:2],
-            log_probability=np.zeros((2, 4)),
+            answers=np.zeros((2, 4)),
             detail="",
-            validation=Rows(record=record, log_probability=np.eye(4)[guess]),
+            parts={"validation": Rows(record=record, answers=np.eye(4)[guess])},
         )
 
     network, indicators = run("oracle_network", 5, 1), run("oracle_indicators", 6)
@@ -176,7 +176,6 @@ def share_right(dataset, name):
         task=task,
         protocol="by_unit",
         features="basic",
-        minirocket_features=84,
         windows=dict,
         caches={},
     )

@@ -20,7 +20,6 @@ REFUSALS = [
     ("window_samples=1.5", WHOLE),
     ("window_samples=long", WHOLE),
     ("stride_samples=-1", f"stride_samples {WHOLE}"),
-    ("minirocket_features=83", "must be a whole number of at least 84"),
     ("batch_size=1", "must be a whole number of at least 2"),
     ("seeds=[]", "seeds must be a list"),
     ("seeds=null", "seeds must be a list"),
@@ -42,9 +41,9 @@ REFUSALS = [
     ("oracle=true", "oracle must be auto or false"),
     ("sham=3", "sham must be the folder of a data set made with plan.sham=true"),
     ("features=some", "features must be basic or all"),
-    ("baselines=[minirockets]", "no baseline 'minirockets'; did you mean 'minirocket'"),
+    ("baselines=[indicator]", "no baseline 'indicator'; did you mean 'indicators'"),
     ("baselines=[reference]", "no baseline 'reference'; there is .*, sound_record"),
-    ("baselines=[minirocket,minirocket]", f"baselines {LIST}"),
+    ("baselines=[indicators,indicators]", f"baselines {LIST}"),
     ("baselines=true", f"baselines {LIST}"),
     ("heads=[tooth]", "no head 'tooth'; there is severity, gear"),
     ("heads=[gear,gear]", f"heads {LIST}"),
@@ -80,7 +79,7 @@ def test_every_run_of_a_sweep_takes_options_of_one_s_own(tmp_path):
 
 @pytest.mark.parametrize(
     ("override", "expected"),
-    [("false", ()), ("[]", ()), ("minirocket", ("minirocket",))],
+    [("false", ()), ("[]", ()), ("indicators", ("indicators",))],
 )
 def test_baselines_may_be_left_out_or_be_one(override, expected):
     assert settings_of(f"baselines={override}").baselines == expected

@@ -132,7 +132,7 @@ def test_another_study_is_refused_and_another_number_of_workers_is_not(
 ):
     refuses(capsys, [*WORDS, "learning_rate=0.01"], "another learning_rate;")
     refuses(capsys, ["train", "data=other", "out=study"], "another data;")
-    refuses(capsys, [*WORDS, "model=wdcnn"], "another model;")
+    refuses(capsys, [*WORDS, "model=order"], "another model;")
     assert brief.made == []
     assert main([*WORDS, "n_threads=3"]) == 0
     assert brief.made == ["study"]

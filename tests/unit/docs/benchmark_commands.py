@@ -12,28 +12,23 @@ QUICK = {
     "benchmarks": ("--quick",),
     "benchmarks.accuracy": ("--duration", "0.02", "--steps", "4"),
     "benchmarks.gearbox_levels": ("--quick",),
-    "benchmarks.many_records": ("--records", "8"),
     "benchmarks.mutants": ("--stored",),
     "benchmarks.replay_rate": ("--quick",),
     "benchmarks.ross": ("--stored",),
     "benchmarks.same_signals": ("--quick",),
-    "benchmarks.scaling": ("--quick",),
     "benchmarks.shaft_line": (
         *("--duration", "0.01", "--checked", "0.01", "--oversampling", "2"),
     ),
     "benchmarks.stages": ("--quick",),
     "benchmarks.stiffness_time": ("--contacts", "2", "--runs", "1"),
-    "benchmarks.vector_widths": ("--quick",),
 }
 # name -> test that runs its parts: trainings and campaigns, of which the least takes minutes
 IN_PARTS = {
     "benchmarks.bridge": "tests/pipeline/tools/test_bridge_tool.py",
-    "benchmarks.carried_parts": "tests/unit/implants/test_fingerprints.py",
     "benchmarks.detection": "tests/unit/diagnose/detection/test_detect_command.py",
     "benchmarks.fuzz_campaign": "tests/unit/dataset/test_fuzz.py",
     "benchmarks.general_model": "tests/unit/diagnose/recordings/test_shipped_network.py",
     "benchmarks.hostile_options": "tests/unit/options/test_wrong_shapes.py",
-    "benchmarks.implants": "tests/unit/implants/test_implanting.py",
     "benchmarks.kill_campaign": "tests/pipeline/test_crash_safety.py",
     "benchmarks.machine_curve": "tests/unit/diagnose/scoring/test_machine_intervals.py",
     "benchmarks.model_campaign": "tests/unit/diagnose/recordings/test_strangers_models.py",

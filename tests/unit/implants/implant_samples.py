@@ -8,7 +8,7 @@ import numpy as np
 from gensig.dataset.folder.beginning import create_folder
 from gensig.dataset.folder.closing import finalize
 from gensig.dataset.folder.layout import shard_path
-from gensig.dataset.folder.manifest import identity_hash, record_shard
+from gensig.dataset.folder.manifest import identity_hash, record_shards
 from gensig.dataset.plan import Plan, record_ids, shard_rows
 from gensig.dataset.reader import open_dataset
 from gensig.dataset.storage.shard import ShardWriter
@@ -101,7 +101,6 @@ def write_pairs(folder, *, twins=True, noise=0.0, classes=CLASSES, n_units=6):
         config=config,
         overrides=[],
         plan=plan,
-        identity=identity,
         seed=0,
         generator_version=__version__,
     )
@@ -143,7 +142,7 @@ def write_pairs(folder, *, twins=True, noise=0.0, classes=CLASSES, n_units=6):
                 "mesh_frequency_hz": SPEED / 60.0 * TEETH[0],
             }
             writer.write(index, made, values)
-    record_shard(folder, 0, writer.sha256, writer.n_bytes, 0)
+    record_shards(folder, {0: writer.entry})
     finalize(folder, figures=False)
     return open_dataset(folder)
 

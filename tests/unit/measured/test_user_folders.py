@@ -7,11 +7,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from refusals import refusals, refused
 from scipy import io
 from scipy.io import wavfile
 
 from gensig.cli import main
-from gensig.errors import ConfigError
 from gensig.measured import load, read_signal
 from gensig.measured.file_names import name_pattern
 
@@ -96,59 +96,36 @@ def test_short_form_of_files(tmp_path) -> None:
     assert found.n_others == 1
 
 
-MISTAKES = {
-    "unknown key": ("unit: g", "unti: g", r"unknown key 'unti'; did you mean 'unit'"),
-    "unknown key of a file": (
-        "specimen: a",
-        "specimn: a",
-        r"files 1: unknown key 'specimn'",
-    ),
-    "unknown label": (
-        "label: healthy",
-        "label: fine",
-        r"the label 'fine' is none of healthy",
-    ),
-    "unknown map": (
-        "broken: one_tooth",
-        "broken: bad",
-        r"maps 'broken' to 'bad'; allowed",
-    ),
-    "no file": ("sound*", "silent*", r"no file is named silent\*; it holds measured"),
-    "out of the folder": (
-        '"sound*"',
-        '"../sound*"',
-        r"'\.\./sound\*' leads out of the folder",
-    ),
-    "absolute": ('"sound*"', '"/etc/sound*"', r"leads out of the folder"),
-    "unknown field": ("{class}_", "{kind}_", r"the unknown field 'kind'"),
-    "too many stars": ("sound*", "s*u*n*d", r"more than 2 stars"),
-    "teeth": ("[[20, 40]]", "[20, 40]", r"stages must be pairs of teeth"),
-    "speed": ("1500", "fast", r"speed_rpm must be a number of 1 to 1e\+06, not 'fast'"),
-    "rate": ("10000", "10", r"sampling_rate_hz must be a number of 1000"),
-    "tag": ("unit: g", "unit: !!python/name:os.system g", r"the tag .* is refused"),
-    "class told twice": (
-        "label: healthy",
-        "label: healthy, rows: [[a, 2]]",
-        r"told 2 times",
-    ),
-    "no files": ("files:", "notes:", r"no files; give files"),
-    "list": ("name: rig", "- rig", r"no YAML|no mapping"),
-    "no such set": (
-        "name: rig",
-        "set: suu",
-        r"no measured set 'suu'; did you mean 'seu'",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", MISTAKES)
-def test_mistakes_are_one_line(name, tmp_path) -> None:
-    old, new, says = MISTAKES[name]
-    assert old in YAML
-    made(tmp_path, text=YAML.replace(old, new))
-    with pytest.raises(ConfigError, match=says) as raised:
+@refusals(
+    {
+        "unknown key 'unti'; did you mean 'unit'": ("unit: g", "unti: g"),
+        "files 1: unknown key 'specimn'": ("specimen: a", "specimn: a"),
+        "the label 'fine' is none of healthy": ("label: healthy", "label: fine"),
+        "maps 'broken' to 'bad'; allowed": ("broken: one_tooth", "broken: bad"),
+        "no file is named silent*; it holds measured": ("sound*", "silent*"),
+        "'../sound*' leads out of the folder": ('"sound*"', '"../sound*"'),
+        "'/etc/sound*' leads out of the folder": ('"sound*"', '"/etc/sound*"'),
+        "the unknown field 'kind'": ("{class}_", "{kind}_"),
+        "more than 2 stars": ("sound*", "s*u*n*d"),
+        "stages must be pairs of teeth": ("[[20, 40]]", "[20, 40]"),
+        "speed_rpm must be a number of 1 to 1e+06, not 'fast'": ("1500", "fast"),
+        "sampling_rate_hz must be a number of 1000": ("10000", "10"),
+        "python/name:os.system' is refused: option files hold plain values": (
+            "unit: g",
+            "unit: !!python/name:os.system g",
+        ),
+        "told 2 times": ("label: healthy", "label: healthy, rows: [[a, 2]]"),
+        "no files; give files": ("files:", "notes:"),
+        "no YAML": ("name: rig", "- rig"),
+        "no measured set 'suu'; did you mean 'seu'": ("name: rig", "set: suu"),
+    }
+)
+def test_mistakes_are_one_line(words, given, tmp_path) -> None:
+    right, wrong = given
+    assert right in YAML
+    made(tmp_path, text=YAML.replace(right, wrong))
+    with refused(words):
         load(None, tmp_path)
-    assert "\n" not in str(raised.value)
 
 
 def test_a_link_out_of_the_folder_is_refused(tmp_path) -> None:
@@ -157,7 +134,7 @@ def test_a_link_out_of_the_folder_is_refused(tmp_path) -> None:
     made(folder)
     np.save(tmp_path / "elsewhere.npy", SAMPLES)
     os.symlink(tmp_path / "elsewhere.npy", folder / "sound2.npy")
-    with pytest.raises(ConfigError, match=r"leads out of"):
+    with refused("leads out of"):
         load(None, folder)
 
 
@@ -165,7 +142,7 @@ def test_an_alias_that_grows_is_refused(tmp_path) -> None:
     lines = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]"]
     lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, 9)]
     made(tmp_path, text="\n".join(lines))
-    with pytest.raises(ConfigError, match=r"stands for more than"):
+    with refused("stands for more than"):
         load(None, tmp_path)
 
 
@@ -182,27 +159,25 @@ def test_numbers_without_names_need_their_columns(tmp_path) -> None:
     (tmp_path / "measured.yaml").write_text(text % "")
     assert read_signal(load(None, tmp_path).recordings[0]).sensors == ("x", "y")
     (tmp_path / "measured.yaml").write_text(text % ", z")
-    with pytest.raises(ConfigError, match=r"2 columns, the set has 3: x, y, z"):
+    with refused("2 columns, the set has 3: x, y, z"):
         read_signal(load(None, tmp_path).recordings[0])
 
 
-@pytest.mark.parametrize(
-    ("content", "says"),
-    [
-        ("a b\nc d\n", r"no line of numbers"),
-        ("1 2\n3\n4 5\n", r"2 columns of numbers from line 1"),
-        ("1 2\nx 3\n", r"2 columns of numbers"),
-        ("1 2\n" * 9, r"too short: 9 rows"),
-    ],
+@refusals(
+    {
+        "no line of numbers": "a b\nc d\n",
+        "2 columns of numbers from line 1": "1 2\n3\n4 5\n",
+        "2 columns of numbers": "1 2\nx 3\n",
+        "too short: 9 rows": "1 2\n" * 9,
+    }
 )
-def test_broken_tables_are_one_line(content, says, tmp_path) -> None:
-    (tmp_path / "a.txt").write_text(content)
+def test_broken_tables_are_one_line(words, given, tmp_path) -> None:
+    (tmp_path / "a.txt").write_text(given)
     (tmp_path / "measured.yaml").write_text(
         "sampling_rate_hz: 10000\nfiles: {a.txt: healthy}"
     )
-    with pytest.raises(ConfigError, match=says) as raised:
+    with refused(words):
         read_signal(load(None, tmp_path).recordings[0])
-    assert "\n" not in str(raised.value)
 
 
 def test_the_verb_prints_what_is_there(tmp_path, capsys) -> None:

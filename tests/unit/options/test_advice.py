@@ -99,7 +99,7 @@ def test_many_values_are_not_listed_and_none_are_refused():
 
 
 def test_keys_of_a_training_are_told_of_its_own_command():
-    for word in ("epochs=3,4", "learning_rate=0.1,0.2", "model=cnn,wdcnn"):
+    for word in ("epochs=3,4", "learning_rate=0.1,0.2", "model=cnn,order"):
         text, advice = advised([word])
         assert text.endswith("diagnose train -m makes one run for each")
         assert advice == []

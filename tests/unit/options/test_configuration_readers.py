@@ -35,7 +35,6 @@ CONFIGURATION = {
     "gensig/plan/make",
     "gensig/production/fault_pairs",
     "gensig/production/folder",
-    "gensig/production/maker",
     "gensig/production/reproduction",
     "gensig/production/shard_writing",
     "gensig/production/streaming",

@@ -171,12 +171,16 @@ def write(folder, content):
     return file
 
 
+def theirs(folder):
+    return read_request(["operating=theirs"], config_dir=folder)
+
+
 @pytest.mark.parametrize("name", ATTACKS)
 def test_a_file_that_is_more_than_values_is_refused(name, folder):
     content, message = ATTACKS[name]
     file = write(folder, content)
     with refused(message) as caught:
-        read_request(["operating=theirs"], config_dir=folder)
+        theirs(folder)
     assert SECRET not in str(caught.value)
     assert len(str(caught.value)) < 600
     if name not in COMPOSED_ALONE:
@@ -226,7 +230,7 @@ def test_options_that_build_on_each_other_twice_are_refused(name, folder):
 def test_an_option_that_builds_on_itself_is_refused(text, folder):
     write(folder, f"defaults: {text}\n")
     with refused("builds on itself"):
-        read_request(["operating=theirs"], config_dir=folder)
+        theirs(folder)
     with refused("builds on itself"):
         option_keys("operating", "theirs", folder)
 
@@ -234,7 +238,7 @@ def test_an_option_that_builds_on_itself_is_refused(text, folder):
 def test_an_option_of_a_few_others_is_composed(folder):
     doubling(folder, "b{n}")
     write(folder, "defaults: [rated, b0, _self_]\ntorque_nm: 3\n")
-    config = read_request(["operating=theirs"], config_dir=folder).config
+    config = theirs(folder).config
     assert config["operating"]["speed_rpm"] == 1
     assert config["operating"]["torque_nm"] == 3
 
@@ -292,18 +296,18 @@ def test_a_link_out_of_the_folder_is_refused(folder):
     file = folder / "operating" / "theirs.yaml"
     file.symlink_to(folder.parent / "outside.yaml")
     with refused("leads out of"):
-        read_request(["operating=theirs"], config_dir=folder)
+        theirs(folder)
     file.unlink()
     (folder / "other.yaml").write_text("defaults: [rated]\nspeed_rpm: 600\n")
     file.symlink_to(folder / "other.yaml")
-    config = read_request(["operating=theirs"], config_dir=folder).config
+    config = theirs(folder).config
     assert config["operating"]["speed_rpm"] == 600
 
 
 def test_what_is_no_file_is_not_waited_for(folder):
     os.mkfifo(folder / "operating" / "theirs.yaml")
     with pytest.raises(ConfigError, match=r"^[^\n]+$"):
-        read_request(["operating=theirs"], config_dir=folder)
+        theirs(folder)
 
 
 WORDS = [

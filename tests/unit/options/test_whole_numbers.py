@@ -1,9 +1,9 @@
 """Counts typed with a point or an exponent are read; numbers that are not whole are refused."""
 
 import pytest
+from refusals import refused
 
 from gensig.cli import verb_parser
-from gensig.errors import ConfigError
 from gensig.execution.registry import read_executor
 from gensig.options.compose import compose
 from gensig.plan.make import make_plan
@@ -39,7 +39,7 @@ def planned(word):
 
 @pytest.mark.parametrize("key", ["plan.n_records", "seed", "executor.n_workers"])
 def test_a_number_that_is_not_whole_is_refused(key):
-    with pytest.raises(ConfigError, match=r"1\.5"):
+    with refused("1.5"):
         planned(f"{key}=1.5e0")
 
 
@@ -53,5 +53,5 @@ def test_a_quantity_keeps_what_is_typed():
 def test_flags_take_them_too():
     parser = verb_parser("generate")
     assert parser.parse_args(["--workers", "1e1"]).workers == 10
-    with pytest.raises(ConfigError, match=r"--workers 1\.5e0 is not a whole number"):
+    with refused("--workers 1.5e0 is not a whole number"):
         parser.parse_args(["--workers", "1.5e0"])

@@ -1,13 +1,13 @@
 """Grids, repeats and counts of a plan: nested and balanced at every level."""
 
 import itertools
-import re
 from collections import Counter, defaultdict
 
 import numpy as np
 import pytest
 from crossed_plan import CROSSED
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 
 from gensig.dataset.plan import plan_text
 from gensig.errors import ConfigError
@@ -164,9 +164,8 @@ class TestGrid:
         ],
     )
     def test_mistakes_are_one_line(self, planned, plan, text):
-        with pytest.raises(ConfigError, match=re.escape(text)) as caught:
+        with refused(text):
             planned(**{**GRID, "vary": speed(SPEED), **plan})
-        assert "\n" not in str(caught.value)
 
     @pytest.mark.parametrize(
         ("levels", "text"),

@@ -3,15 +3,15 @@
 import functools
 import json
 import operator
-import re
 
 import numpy as np
 import pytest
 from crossed_plan import CROSSED
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 
 from gensig.dataset.plan import plan_text
-from gensig.errors import ConfigError, GensigError
+from gensig.errors import GensigError
 from gensig.options.configuration import Configuration
 from gensig.plan.make import make_plan, record_bytes, records_per_shard
 from gensig.plan.request import read_request
@@ -181,8 +181,7 @@ class TestRefusals:
     def test_keys_that_cannot_be_varied(self, planned, keys, text):
         for key in keys:
             vary = {key: {"distribution": "uniform", "low": 1, "high": 2}}
-            whole = re.escape(f"plan.vary: '{key}' {text}")
-            with pytest.raises(ConfigError, match=whole):
+            with refused(f"plan.vary: '{key}' {text}"):
                 planned(plan={"vary": vary})
 
     @pytest.mark.parametrize(
@@ -210,12 +209,12 @@ class TestRefusals:
         ],
     )
     def test_counts_and_choices(self, planned, changes, text):
-        with pytest.raises(ConfigError, match=re.escape(text)):
+        with refused(text):
             planned(plan={"n_records": 8, **changes})
 
     def test_an_option_of_ones_own_that_lacks_a_key(self, planned, quickstart):
         text = "plan: missing key 'n_repeats'; it has n_records, n_units"
-        with pytest.raises(ConfigError, match=text):
+        with refused(text):
             planned(plan=quickstart["plan"].without("n_repeats"))
 
     @pytest.mark.parametrize(
@@ -238,7 +237,7 @@ class TestRefusals:
         config = quickstart.plain()
         *parents, leaf = key.split(".")
         functools.reduce(operator.getitem, parents, config)[leaf] = value
-        with pytest.raises(GensigError, match=text):
+        with refused(text, GensigError):
             make_plan(Configuration(config))
 
 

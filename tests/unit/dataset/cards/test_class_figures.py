@@ -17,7 +17,7 @@ from gensig.dataset.cards.class_figures import (
 )
 from gensig.dataset.folder.closing import finalize
 from gensig.dataset.folder.layout import shard_path
-from gensig.dataset.folder.manifest import record_shard
+from gensig.dataset.folder.manifest import record_shards
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.plan import Plan
 from gensig.dataset.reader import open_dataset
@@ -117,7 +117,7 @@ def test_hostile_class_names_stay_names(tmp_path):
         plan,
         attributes=ATTRIBUTES | {"class_names": ["healthy", evil]},
     )
-    record_shard(folder, 0, writer.sha256, writer.n_bytes, writer.n_failed)
+    record_shards(folder, {0: writer.entry})
     finalize(folder)
     names = sorted(path.name for path in (folder / "figures").iterdir())
     assert names == ["0-healthy.png", "1--frac-b-x.png"]

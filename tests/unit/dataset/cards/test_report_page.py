@@ -20,7 +20,7 @@ from gensig.errors import ConfigError, DatasetError
 from gensig.report.conditions import choose
 from gensig.report.document import write_report
 from gensig.report.examples import _lines
-from gensig.report.levels import level_table, loudness, velocity_rms
+from gensig.report.levels import class_levels, level_table, loudness, velocity_rms
 from gensig.report.packing import STEP_DB, pack_amplitude, pack_signal
 from gensig.report.rotation_frequencies import Rotation, read_rotation
 from gensig.report.values import Measured, some_records
@@ -364,14 +364,18 @@ def test_levels_are_stated_in_g_and_mm_s_and_loud_ones_are_named(data):
         further={"velocity_rms": np.array([[2e-3, 1.0], [4e-3, 1.0]])},
     )
     replace_column(data, "label_name", np.array(["healthy", "crack"]))
-    channels, units = ["case", "shaft"], ["m/s^2", "rad/s"]
-    table = level_table(data, measured, channels, units)
-    rows = [list(row) for row in table.rows]
+    channels = ["case", "shaft"]
+
+    def levels(*units):
+        return class_levels(data, measured, channels, units)
+
+    known = levels("m/s^2", "rad/s")
+    rows = [list(row) for row in level_table(known).rows]
     healthy, crack = ["healthy", "case", "97", "9.89"], ["crack", "case", "98.2", "10"]
     assert rows == [[*healthy, "2"], [*crack, "4"]]
-    (line,) = loudness(data, measured, channels, units)
+    (line,) = loudness(known)
     assert line.startswith("Louder than most published housings: crack. Above 10 g")
     measured.further["velocity_rms"][0, 0] = 12e-3
-    (line,) = loudness(data, measured, channels, units)
+    (line,) = loudness(levels("m/s^2", "rad/s"))
     assert "housings: healthy, crack." in line
-    assert level_table(data, measured, channels, ["rad/s"] * 2) is None
+    assert level_table(levels("rad/s", "rad/s")) is None

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 from dataset_samples import build, make_plan
+from refusals import refused
 
 from gensig.dataset.folder.closing import finalize
-from gensig.dataset.folder.manifest import read_manifest
+from gensig.dataset.folder.layout import read_manifest
 from gensig.dataset.folder.quick_check import absences
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.storage.checksums import accept_edits, read_checksums
@@ -141,7 +142,7 @@ def test_an_edited_card_is_there_and_one_that_is_gone_is_not(with_log):
 
 def test_a_card_that_is_gone_is_not_accepted(with_log):
     (with_log / "README.md").unlink()
-    with pytest.raises(DatasetError, match=r"README\.md is missing"):
+    with refused("README.md is missing", DatasetError):
         accept_edits(with_log)
 
 
@@ -154,7 +155,7 @@ def test_checksums_that_are_gone_are_written_when_asked(with_log):
 
 
 def test_an_incomplete_set_has_nothing_to_accept(tmp_path, plan):
-    with pytest.raises(DatasetError, match="incomplete"):
+    with refused("incomplete", DatasetError):
         accept_edits(build(tmp_path / "a", plan, close=False))
 
 
@@ -170,6 +171,6 @@ def test_an_incomplete_set_has_nothing_to_accept(tmp_path, plan):
 def test_forged_lines_are_refused(with_log, line):
     with (with_log / "SHA256SUMS").open("a") as file:
         file.write(line + "\n")
-    with pytest.raises(DatasetError, match="none of a data set"):
+    with refused("none of a data set", DatasetError):
         read_checksums(with_log)
     assert not verify(with_log).complete

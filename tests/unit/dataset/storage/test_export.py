@@ -11,6 +11,7 @@ import pytest
 from dataset_samples import ATTRIBUTES, CLASSES, build, make_plan
 from numpy.testing import assert_array_equal
 from pyarrow import parquet
+from refusals import refused
 from scipy.io import wavfile
 
 import gensig.dataset.exports.export as export_module
@@ -129,22 +130,21 @@ def test_wav(stored, tmp_path, n_files):
 def test_nothing_is_overwritten_and_nothing_half_written(folder, tmp_path, to):
     taken = tmp_path / "taken"
     taken.write_text("mine")
-    with pytest.raises(DatasetError, match="exists and is left alone"):
+    with refused("exists and is left alone", DatasetError):
         export(folder, to, taken)
     assert taken.read_text() == "mine"
     out = tmp_path / NAMES[to]
     shard_path(folder, 3).write_bytes(shard_path(folder, 3).read_bytes()[:-2000])
     before = {path.name for path in tmp_path.iterdir()}
-    with pytest.raises(DatasetError) as caught:
+    with refused("", DatasetError):
         export(folder, to, out, samples=to == "parquet")
-    assert "\n" not in str(caught.value)
     assert {path.name for path in tmp_path.iterdir()} == before
 
 
 def test_a_full_disk_is_said_before_anything_is_written(folder, tmp_path, monkeypatch):
     usage = type("Usage", (), {"free": 36 * 2 * 200 * 4 - 1})
     monkeypatch.setattr(export_module.shutil, "disk_usage", lambda _path: usage)
-    with pytest.raises(DatasetError, match="57600 bytes and 57599 are free"):
+    with refused("57600 bytes and 57599 are free", DatasetError):
         export(folder, "hdf5", tmp_path / "all.h5")
     assert not (tmp_path / "all.h5").exists()
     usage.free += 1  # all of the disk may be filled
@@ -180,17 +180,17 @@ def test_a_foreign_plan_names_no_file(folder, tmp_path):
     """Ids become file names, so that a shard cannot choose where a wav file goes."""
     with h5py.File(shard_path(folder, 0), "r+") as file:
         file["record_id"][1] = b"../../evil"
-    with pytest.raises(DatasetError, match="different record ids"):
+    with refused("different record ids", DatasetError):
         export(folder, "wav", tmp_path / "all")
     assert not list(tmp_path.rglob("evil*"))
 
 
 def test_incomplete_sets_and_odd_rates_are_refused(tmp_path, plan, monkeypatch):
-    with pytest.raises(DatasetError, match="is incomplete"):
+    with refused("is incomplete", DatasetError):
         export(build(tmp_path / "a", plan, close=False), "npz", tmp_path / "x.npz")
     monkeypatch.setitem(ATTRIBUTES, "sampling_rate_hz", 1000.5)
     folder = build(tmp_path / "b", plan)
-    with pytest.raises(DatasetError, match="whole hertz"):
+    with refused("whole hertz", DatasetError):
         export(folder, "wav", tmp_path / "x")
     assert not (tmp_path / "x").exists()
 

@@ -178,7 +178,7 @@ def test_a_visible_fault_is_learnt_stored_evaluated_and_predicted(dataset, tmp_p
     source = Source(file=file, sampling_rate=12800.0, speed_rpm=speed)
     result = predict_recording(network, None, source)
     assert result["class"] == task.class_names[label]
-    severity = prediction.heads["severity"][0, label]
+    severity = prediction.further["severity"][0, label]
     assert_allclose(result["severity"], severity, rtol=1e-3)
     assert (result["gear"] != "none") == (", severity" in network.line(result))
     with pytest.raises(ConfigError, match="give --speed-rpm"):
@@ -208,9 +208,9 @@ def test_heads_that_are_right_have_no_error(dataset):
         method="order",
         seed=0,
         record=record,
-        log_probability=np.zeros((record.size, 2)),
+        answers=np.zeros((record.size, 2)),
         detail="",
-        heads={"severity": severity, "gear": np.log(np.eye(3)[truth["gear"]] + 1e-9)},
+        further={"severity": severity, "gear": np.log(np.eye(3)[truth["gear"]] + 1e-9)},
     )
     scores = head_scores(task, record, [right], n_bootstrap=20)
     assert scores["faulted_gear"]["balanced_accuracy"]["low"] == 1.0

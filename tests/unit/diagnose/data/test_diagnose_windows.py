@@ -9,7 +9,7 @@ from fake_dataset import CLASSES, FakeDataset
 from numpy.testing import assert_allclose
 from small_studies import windows_of
 
-from diagnose.data.torch_sets import VibrationDataset
+from diagnose.data import VibrationDataset
 from diagnose.data.windows import (
     SUBSETS,
     Segments,

@@ -11,8 +11,7 @@ from fake_stream import FakeStream
 from torch.utils.data import DataLoader
 
 from diagnose.data import Gain, ReplayStream, StreamingDataset
-from diagnose.data.loading.records_ahead import RecordsAhead
-from gensig.errors import ConfigError, DatasetError
+from diagnose.data.loading.replay import RecordsAhead
 
 WINDOW = {"window_samples": 700, "stride_samples": 300}
 N_RECORDS, N_WINDOWS = 16, 9  # of the fake stream, and windows of a record
@@ -132,26 +131,6 @@ def test_the_speed_of_simulation_does_not_change_what_is_drawn(monkeypatch):
     assert bits(replay()) == expected
 
 
-def test_set_epoch_reaches_workers_that_stay_alive():
-    windows = replay()
-    batches = loader(windows, 2, persistent_workers=True)
-    passes = []
-    for epoch in (0, 1, 0):
-        windows.set_epoch(epoch)
-        passes.append(bits(batches))
-    assert passes[0] == passes[2] != passes[1]
-    fresh = replay(FakeStream(epoch=1))
-    assert Counter(bits(fresh)) == Counter(passes[1])
-
-
-def test_epochs_follow_one_another_in_one_buffer():
-    both = Counter(bits(replay(n_epochs=2)))
-    single = [Counter(bits(replay(FakeStream(epoch=epoch)))) for epoch in (0, 1)]
-    assert both == single[0] + single[1]
-    endless = bits(itertools.islice(replay(n_epochs=None), 1000))
-    assert len(endless) == 1000
-
-
 def test_batches_are_the_single_windows_in_their_order():
     plain = replay(target="severity")
     single = list(plain)
@@ -184,22 +163,6 @@ def test_without_reuse_windows_never_end_and_newer_records_come_in():
     assert len({record for record, _ in drawn}) > 4
 
 
-def test_failed_records_are_left_out():
-    drawn = places(replay(FakeStream(failed=(3, 5))))
-    assert len({record for record, _ in drawn}) == N_RECORDS - 2
-
-
-@pytest.mark.parametrize("n_workers", [0, 1])
-def test_the_error_of_a_record_reaches_the_loop(n_workers):
-    with pytest.raises(DatasetError, match=r"record r00000: .* not finite"):
-        next(iter(loader(replay(FakeStream(noise=np.nan)), n_workers)))
-
-
-def test_a_worker_without_records_ends():
-    windows = replay(None, "by_unit", "test", n_epochs=None)  # one condition
-    assert len(bits(itertools.islice(loader(windows, 2), 50))) == 50
-
-
 def test_a_loop_that_is_left_stops_its_thread():
     before = set(threading.enumerate())
     items = iter(replay(n_epochs=None))
@@ -223,19 +186,3 @@ def test_no_more_records_are_made_ahead_than_asked_for():
     ahead.close()
     assert taken == [0, 1]
     assert len(made) <= 2 + 3
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"reuse": 0}, "reuse = 0 must be at least 1"),
-        ({"buffer_records": 0}, "buffer_records = 0 must be at least 1"),
-        ({"batch_size": 0}, "batch_size = 0 must be at least 1"),
-        ({"reuse": None}, "reuse=None never ends"),
-        ({"n_epochs": 0}, "n_epochs must be at least 1 or None, not 0"),
-        ({"window_samples": 5000}, "window_samples=5000 is too long"),
-    ],
-)
-def test_mistakes_are_refused_at_once(changes, message):
-    with pytest.raises(ConfigError, match=message):
-        replay(**changes)

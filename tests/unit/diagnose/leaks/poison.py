@@ -22,8 +22,7 @@ from diagnose.baselines.base import Role
 from diagnose.baselines.registry import BASELINES, baseline_names
 from diagnose.data import lives as life_data
 from diagnose.data.windows import Segments, subset_segments
-from diagnose.scoring.alarm_threshold import alarm_threshold
-from diagnose.studies import class_jobs, life_jobs
+from diagnose.studies import class_jobs, life_jobs, novelty_metrics
 from diagnose.studies import novelty as novelty_runs
 from diagnose.studies.class_jobs import ORACLE, PROBE
 from diagnose.studies.jobs import Job
@@ -35,21 +34,14 @@ AS_THEY_ARE = ("life_failed",)  # the same for all records of a life
 LEVEL_KEPT = "normalise=none"  # else no input is divided by the level of other records
 # how many shuffles are drawn, the test decides
 NO_SHUFFLE = "shuffle_control=false"
-WORDS = (*TINY_CNN, LEVEL_KEPT, NO_SHUFFLE, "minirocket_features=168", "epochs=2")
+WORDS = (*TINY_CNN, LEVEL_KEPT, NO_SHUFFLE, "epochs=2")
 RIVALS = f"baselines=[{','.join(baseline_names(Role.RIVAL))}]"
 BASELINE_JOBS = tuple(
     Job(protocols=("by_unit",), seed=None, control=control)
     for control in ("", PROBE, ORACLE)
 )
 OPEN = ("healthy_only", "open_set")
-OF_TEST = (
-    "record",
-    "log_probability",
-    "windows",
-    "last_predicted",
-    "predicted",
-    "n_followed",
-)
+OF_TEST = ("record", "answers", "further", "n_followed", "windows")
 
 
 class Poisoned:
@@ -128,9 +120,10 @@ def prints(values):
 def of_fields(outcome):
     """Fingerprint of each field of an outcome that is known before the test is scored."""
     values = {field.name: getattr(outcome, field.name) for field in fields(outcome)}
-    domain = values.pop("domain", None)
-    if domain is not None:
-        values |= {f"domain_{name}": part for name, part in asdict(domain).items()}
+    values |= values.pop("parts")
+    for field in ("domain", "hours"):
+        if (part := values.pop(field)) is not None:
+            values |= {f"{field}_{name}": each for name, each in asdict(part).items()}
     return prints({name: values[name] for name in values if name not in OF_TEST})
 
 
@@ -172,7 +165,7 @@ def novelty(subset, *words):
     runs = run(*study_of(dataset, *WORDS, *words), *kinds)
     return {
         f"{each.protocol}/{each.method}": of_fields(each)
-        | prints({"threshold": alarm_threshold(each.validation_score)})
+        | prints({"score": each.answers, "threshold": novelty_metrics.threshold(each)})
         for each in runs
     }
 

@@ -40,7 +40,6 @@ def source():
         task=task,
         protocol="by_unit",
         features="basic",
-        minirocket_features=168,
         windows=lambda: class_jobs._windows(task, "by_unit"),
         caches={},
     )
@@ -67,7 +66,7 @@ def chance_of_baseline(name, parts, source, seen):
         run_of_draw = _prediction(
             BASELINES[name](), seen(replace(parts, test=test)), source
         )
-        chosen = run_of_draw.log_probability.argmax(axis=1)
+        chosen = run_of_draw.answers.argmax(axis=1)
         assert len(chosen) == N_CANARIES >= 200
         n_right += (chosen == label[run_of_draw.record]).sum()
     return chance_of(n_right, n_draws * N_CANARIES)
@@ -89,7 +88,7 @@ def chance_of_network():
     """Probability of the right answers of a network trained by a study."""
     task, settings = study_of(Canaries(), *TINY_CNN, *WINDOW, *LEARNS)
     (prediction,) = run(task, settings)
-    chosen = prediction.log_probability.argmax(axis=1)
+    chosen = prediction.answers.argmax(axis=1)
     assert len(chosen) == N_CANARIES
     n_right = (chosen == task.labels()[prediction.record]).sum()
     return chance_of(n_right, N_CANARIES)

@@ -3,7 +3,7 @@
 import pytest
 from poison import STUDIES, changes, training_on
 
-from diagnose.baselines import life_models, minirocket
+from diagnose.baselines import life_models
 from diagnose.baselines.estimators import FittedModel
 
 NO_CHOICE = "patience=0"  # all epochs run, whatever the validation loss is
@@ -16,8 +16,8 @@ CALIBRATED = {
         "temperature",
         "domain_threshold",
     },
-    "novelty": {"validation_score", "threshold"},
-    "lives": {"validation", "half_width", "facts", "domain_threshold"},
+    "novelty": {"validation", "threshold"},
+    "lives": {"validation", "hours_half_width_h", "domain_threshold"},
 }
 BY_TEMPERATURE = "open_set/largest_probability"  # its scores are calibrated
 
@@ -27,7 +27,6 @@ def without_choice(monkeypatch):
     """Every method keeps its first candidate."""
     first = dict([*life_models._candidates().items()][:1])
     monkeypatch.setattr(FittedModel, "accuracy", lambda *_: 0.0)
-    monkeypatch.setattr(minirocket, "record_accuracy", lambda *_: 0.0)
     monkeypatch.setattr(life_models, "_candidates", lambda: first)
 
 

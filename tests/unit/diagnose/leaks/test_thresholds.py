@@ -9,6 +9,7 @@ from poison import Poisoned
 from small_studies import TINY_CNN, run, study_of
 
 from diagnose.data.windows import REFERENCES, subset_segments
+from diagnose.scoring.judged import judged_runs
 from diagnose.studies import answers
 from diagnose.studies.jobs import Job
 from diagnose.studies.protocol_results import protocol_result
@@ -95,10 +96,10 @@ def test_nothing_that_is_set_follows_the_signals_that_are_scored(studies):
     assert "null" not in known[f"{CNN}/threshold"]
 
 
-def on_the_test(task, method, runs):
+def on_the_test(task, runs):
     """Leak put in on purpose: healthy test records, each twice, in place of those held back."""
-    judged = answers._judged(task, method, runs, runs[0].record)
-    healthy = np.flatnonzero(judged.label == task.class_names.index("healthy"))
+    judged = judged_runs(task, runs)
+    healthy = np.flatnonzero(judged.truth == task.class_names.index("healthy"))
     return judged.of(np.tile(healthy, 2))
 
 

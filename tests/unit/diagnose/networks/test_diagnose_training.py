@@ -9,8 +9,8 @@ from fake_dataset import FakeDataset
 from numpy.testing import assert_allclose
 from small_studies import LEARNS, plan_of, run, study_of, windows_of
 
+from diagnose.studies.controls import method_result
 from diagnose.studies.jobs import Job
-from diagnose.studies.protocol_results import score_predictions
 from diagnose.training.classes import with_shuffled_labels
 from diagnose.training.train import _Descent
 from gensig.errors import ConfigError
@@ -37,10 +37,8 @@ def study():
 
 def score(study, method):
     task, settings, predictions = study
-    runs = [(p.record, p.predicted) for p in predictions if p.method == method]
-    is_shuffled = method == "label_shuffle"
-    scores = score_predictions(task, runs, settings.n_bootstrap, shuffled=is_shuffled)
-    return scores["balanced_accuracy"]
+    runs = [each for each in predictions if each.method == method]
+    return method_result(task, settings, runs)["balanced_accuracy"]
 
 
 def test_a_visible_fault_is_learnt_above_chance(study):

@@ -64,7 +64,7 @@ def check_metadata(session, description):
 
 @pytest.mark.parametrize(
     "network",
-    ["levels_model", "model=wdcnn", "model=spectrum"],
+    ["levels_model", "model=cnn"],
 )
 def test_the_file_answers_like_torch(
     network, two_channels, train_network, request, tmp_path, capsys

@@ -21,10 +21,11 @@ from diagnose.data.lives import (
     lives_of,
 )
 from diagnose.report import life_report
-from diagnose.scoring.judged import interval_text
+from diagnose.scoring.hours import LifeFacts
+from diagnose.scoring.intervals import interval_text
+from diagnose.scoring.judged import Judged
 from diagnose.scoring.life_scores import (
     MEASURES,
-    Snapshots,
     by_life,
     conformal_half_width,
     gain,
@@ -33,8 +34,8 @@ from diagnose.scoring.life_scores import (
     prognostic_horizon,
 )
 from diagnose.scoring.machines import Machines
+from diagnose.scoring.predictions import Prediction
 from diagnose.studies import life_jobs
-from diagnose.studies.life_jobs import LifePrediction
 from diagnose.studies.study import task_from
 from gensig.errors import ConfigError, DatasetError
 
@@ -42,6 +43,10 @@ from gensig.errors import ConfigError, DatasetError
 def settled(dataset, *overrides):
     settings = settings_of(*LIFE, *overrides)
     return task_from(dataset, settings), settings
+
+
+def hours(**values):
+    return LifeFacts(method="cnn", coverage=0.8, n_calibration_lives=9, **values)
 
 
 def planned(dataset, *overrides):
@@ -77,18 +82,18 @@ def test_the_horizon_is_where_predictions_stay_within_the_band(predicted, expect
 
 def test_every_life_counts_the_same():
     # life 0: one snapshot, error 6; life 1: three, each 2 too late, the last at the failure
-    snapshots = Snapshots(
-        life=np.array([0, 1, 1, 1]),
-        true=np.array([50.0, 60.0, 30.0, 0.0]),
-        said=np.array([44.0, 62.0, 32.0, 2.0]),
-        half_width=3.0,
-        early_life=125.0,
+    judged = Judged(
+        method="cnn",
+        unit=np.array([0, 1, 1, 1]),
+        machines=Machines.alone(2, "lives"),
+        truth=np.array([50.0, 60.0, 30.0, 0.0]),
+        answers=np.array([44.0, 62.0, 32.0, 2.0])[None, :, None],
     )
-    values = {name: row[None] for name, row in by_life(snapshots).items()}
+    values = by_life(judged, [hours(early_life_h=125.0, half_width_h=3.0)])
     assert set(values) == set(MEASURES)
 
     drawn = {
-        "machines": Machines.alone(2, "lives"),
+        "machines": judged.machines,
         "n_bootstrap": 1000,
         "rng": np.random.default_rng(0),
     }
@@ -176,15 +181,14 @@ def test_a_curve_that_no_line_follows_is_learnt_by_boosting(curve, is_line):
 
 def test_a_figure_of_lives_ends_at_the_failure_on_the_right(monkeypatch):
     lives, level = lives_of(settled(FakeLives(n_lives=4))[0]), 150.0
-    prediction = LifePrediction(
+    prediction = Prediction(
         protocol="by_unit",
         method="network",
         seed=0,
         record=np.arange(lives.age.size),
-        predicted=np.minimum(lives.remaining, level),
-        half_width=10.0,
-        early_life=level,
+        answers=np.minimum(lives.remaining, level)[:, None],
         detail="",
+        hours=hours(early_life_h=level, half_width_h=10.0),
     )
     figures = []
     monkeypatch.setattr(
@@ -385,7 +389,7 @@ def test_a_job_that_is_sent_to_another_process_gives_the_same_bits(life_study, l
 
     for each in run(task, settings, job):
         expected = [row["predicted_h"] for row in rows if row["method"] == each.method]
-        assert [f"{hours:.6g}" for hours in each.predicted] == expected
+        assert [f"{hours:.6g}" for hours in each.answers[:, 0]] == expected
 
 
 def test_only_the_training_part_has_what_a_training_profits_from(monkeypatch):

@@ -14,8 +14,8 @@ from refusals import refused
 from runs import metrics_of, model_of, refuses, rows_of, says, serve
 
 from benchmarks._damaged_models import forge
+from diagnose.scoring.hours import LifeFacts
 from diagnose.scoring.life_scores import MEASURES
-from diagnose.training.life_facts import LifeFacts
 from diagnose.training.remaining_life import load_life_model
 from diagnose.training.store import load_model
 from gensig.errors import DatasetError

@@ -21,7 +21,8 @@ from diagnose.report.answer_figures import (
 )
 from diagnose.report.answer_tables import write_tables
 from diagnose.scoring.conditions import by_condition, condition_columns
-from diagnose.scoring.judged import Judged, with_interval
+from diagnose.scoring.intervals import with_interval
+from diagnose.scoring.judged import Judged
 from diagnose.scoring.machines import Machines, Support
 from diagnose.scoring.paired import compare, holm, permutation_p_value
 from diagnose.scoring.predictions import Prediction, Rows
@@ -41,10 +42,10 @@ def scores_of(predicted, sure=5.0):
 def judged(predicted, label, unit, method="cnn"):
     return Judged(
         method=method,
-        label=label,
+        truth=label,
         unit=unit,
         machines=Machines.alone(int(unit.max()) + 1),
-        log_probability=scores_of(np.atleast_2d(predicted)),
+        answers=scores_of(np.atleast_2d(predicted)),
     )
 
 
@@ -192,7 +193,7 @@ def test_one_unit_has_no_interval():
     assert result["weakest"] == []
     assert "Too few test records or machines" in result["summary"]
     unknown = with_interval(
-        0.5, np.full(10, np.nan), Support(kind="machines", n_groups=9)
+        np.array([0.5] + 10 * [np.nan]), Support(kind="machines", n_groups=9)
     )
     assert unknown == {"mean": 0.5, "low": None, "high": None, "too_few": None}
 
@@ -211,7 +212,7 @@ def test_window_length_shows_the_gain_of_later_windows(copied, verdict):
         scores = np.repeat(scores[::4], 4, axis=0)
     result = by_window_length(
         judged(label, label, unit),
-        [(record, scores)],
+        [Rows(record=record, answers=scores)],
         window_seconds=0.1,
         step_seconds=0.05,
         n_bootstrap=300,
@@ -237,19 +238,20 @@ def study():
     def rows(record, skill):
         knows = rng.uniform(size=record.size) < skill
         scores = scores_of(np.where(knows, label[record], 0))
-        return Rows(record=record, log_probability=scores)
+        return Rows(record=record, answers=scores)
 
     def prediction(method, seed, skill):
-        windows = rows(np.repeat(test, 2), skill) if method == "cnn" else None
+        parts = {}
+        if method == "cnn":
+            parts["windows"] = rows(np.repeat(test, 2), skill)
         return Prediction(
             protocol="by_unit",
             method=method,
             seed=seed,
             record=test,
-            log_probability=rows(test, skill).log_probability,
+            answers=rows(test, skill).answers,
             detail="",
-            validation=rows(validation, skill),
-            windows=windows,
+            parts=parts | {"validation": rows(validation, skill)},
         )
 
     trained = (("cnn", 0, 0.9), ("cnn", 1, 0.9), ("indicators", 0, 0.5))
@@ -294,19 +296,21 @@ def test_the_best_baseline_is_chosen_on_validation_machines(study):
     """Not on the test records, where another one is better."""
     task, settings, runs = study
     indicators, label = runs[-1], task.labels()
+    validation = indicators.parts["validation"].record
     lucky = dataclasses.replace(
         indicators,
-        method="minirocket",
-        log_probability=scores_of(label[indicators.record]),
-        validation=dataclasses.replace(
-            indicators.validation,
-            log_probability=scores_of(np.zeros_like(indicators.validation.record)),
-        ),
+        method="nearest_spectrum",
+        answers=scores_of(label[indicators.record]),
+        parts={
+            "validation": Rows(
+                record=validation, answers=scores_of(np.zeros_like(validation))
+            )
+        },
     )
     answers = protocol_answers(task, settings, [*runs, lucky])
     assert answers["best_baseline"] == "indicators"
     against = {row["against"]: row["difference"] for row in answers["comparisons"]}
-    assert against["minirocket"]["mean"] < against["indicators"]["mean"]
+    assert against["nearest_spectrum"]["mean"] < against["indicators"]["mean"]
 
 
 @pytest.fixture
@@ -373,8 +377,8 @@ def test_a_class_of_few_records_names_their_number(study, tmp_path):
         dataclasses.replace(
             run,
             record=run.record[:24],
-            log_probability=run.log_probability[:24],
-            windows=None,
+            answers=run.answers[:24],
+            parts={"validation": run.parts["validation"]},
         )
         for run in runs
     ]
@@ -389,7 +393,7 @@ def test_a_class_of_few_records_names_their_number(study, tmp_path):
 def test_parts_without_ground_are_left_out(study, tmp_path):
     task, settings, runs = study
     task.dataset.columns["severity"] = np.where(task.labels() > 0, 1.0, 0.0)
-    alone = [dataclasses.replace(run, windows=None) for run in runs[:2]]
+    alone = [dataclasses.replace(run, parts={}) for run in runs[:2]]
     answers = protocol_answers(task, settings, alone)
     assert "window_length" not in answers
     assert (answers["best_baseline"], answers["comparisons"]) == (None, [])

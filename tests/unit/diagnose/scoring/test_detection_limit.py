@@ -11,14 +11,15 @@ from scipy.stats import binomtest, zscore
 from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import roc_auc_score
 
-from diagnose.scoring.alarm_threshold import LEAST_HEALTHY, alarm_threshold
+from diagnose.scoring.alarms import LEAST_HEALTHY, alarm_threshold
 from diagnose.scoring.detection_curve import curve_at, fit_curves, limits
 from diagnose.scoring.detection_limit import (
     detection,
     detection_score,
     size_columns,
 )
-from diagnose.scoring.judged import Judged, exact_interval, share_with_interval
+from diagnose.scoring.intervals import exact_interval, share_with_interval
+from diagnose.scoring.judged import Judged
 from diagnose.scoring.machines import Machines, Support
 
 
@@ -27,10 +28,10 @@ def judged(score, label, unit):
     score = np.atleast_2d(score)
     return Judged(
         method="cnn",
-        label=label,
+        truth=label,
         unit=unit,
         machines=Machines.alone(int(unit.max()) + 1),
-        log_probability=np.stack([np.zeros_like(score), score], axis=-1),
+        answers=np.stack([np.zeros_like(score), score], axis=-1),
     )
 
 
@@ -55,7 +56,7 @@ def cracks():
 def held_back(n_units=20, per_unit=20):
     """Healthy records of validation machines."""
     judged_there, _ = study(n_units=n_units, per_unit=per_unit, seed=1)
-    return judged_there.of(judged_there.label == 0)
+    return judged_there.of(judged_there.truth == 0)
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +78,7 @@ def answer(test, healthy_elsewhere, severity):
 def crack_with(score, cracks):
     """Result of the cracks for other scores."""
     test, severity = cracks
-    other = judged(score, test.label, test.unit)
+    other = judged(score, test.truth, test.unit)
     return answer(other, held_back(), severity)["classes"]["crack"]
 
 
@@ -200,7 +201,7 @@ def test_the_share_of_resamples_is_of_the_resamples_alone():
 
 
 def test_perfect_blind_and_equal_scores(cracks):
-    label = cracks[0].label
+    label = cracks[0].truth
     perfect = crack_with(100.0 * label, cracks)
     share = perfect["share_found"]
 
@@ -222,9 +223,9 @@ def test_perfect_blind_and_equal_scores(cracks):
 
 def test_the_area_is_that_of_scikit_learn(cracks):
     test, _ = cracks
-    rounded = np.round(test.log_probability[0, :, 1])
+    rounded = np.round(test.answers[0, :, 1])
     area = crack_with(rounded, cracks)["auroc"]["mean"]
-    assert_allclose(area, roc_auc_score(test.label, rounded))
+    assert_allclose(area, roc_auc_score(test.truth, rounded))
 
 
 def test_too_many_false_alarms_are_reported(validation):
@@ -264,7 +265,7 @@ def test_one_unit_has_no_interval_and_one_severity_no_curve():
 
 def test_all_of_few_units_do_not_prove_a_share_of_one():
     eight = Support(kind="machines", n_groups=8)
-    interval = share_with_interval(1.0, np.ones(50), eight)
+    interval = share_with_interval(np.ones(51), eight)
     assert_allclose(
         interval["low"],
         0.025 ** (1 / 8),
@@ -276,13 +277,13 @@ def test_all_of_few_units_do_not_prove_a_share_of_one():
 def test_the_interval_of_a_rate_is_exact_over_groups_of_machines():
     """As many independent trials, whatever few resamples show; more where these spread more."""
     twenty = Support(kind="machines", n_groups=20)
-    one_of_twenty = share_with_interval(0.05, np.full(50, 0.05), twenty)
+    one_of_twenty = share_with_interval(np.full(51, 0.05), twenty)
     exact = binomtest(1, 20).proportion_ci(0.95, method="exact")
     assert_allclose(
         [one_of_twenty["low"], one_of_twenty["high"]], [exact.low, exact.high]
     )
     assert 0.24 < exact.high < 0.25
-    spread = share_with_interval(0.5, np.linspace(0, 1, 101), twenty)
+    spread = share_with_interval(np.array([0.5, *np.linspace(0, 1, 101)]), twenty)
     assert_allclose([spread["low"], spread["high"]], [0.02, 0.98], atol=0.011)
     half = exact_interval(0.125, 4)  # half a success
     assert exact_interval(0.0, 4)[1] < half[1] < exact_interval(0.25, 4)[1]

@@ -1,6 +1,6 @@
 """Scores in closed form, intervals over units, indicators and their baselines."""
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,10 +26,10 @@ from diagnose.data.windows import subset_segments, task_of
 from diagnose.report.novelty_report import novelty_caveats
 from diagnose.report.page import without_interval
 from diagnose.report.text import score_cell
+from diagnose.scoring.intervals import is_above
 from diagnose.scoring.machines import LEAST_UNITS
 from diagnose.scoring.metrics import (
     balanced_accuracy,
-    is_above,
     macro_f1,
     over_records,
     ratio_with_interval,
@@ -67,10 +67,10 @@ def test_interval_is_over_units_not_over_records():
     confusion[0, :5, [0, 1], [0, 1]] = 1
     confusion[0, 5:, [0, 1], [1, 0]] = 1
     few, many = (accuracy_with_interval(n * confusion, 4000) for n in (2, 200))
-    assert few.mean == pytest.approx(0.5)
-    assert_allclose([many.low, many.high], [few.low, few.high], rtol=1e-12)
+    assert few["mean"] == pytest.approx(0.5)
+    assert_allclose([many["low"], many["high"]], [few["low"], few["high"]], rtol=1e-12)
     expected = 2 * 1.96 * np.sqrt(0.25 / 10)
-    assert few.high - few.low == pytest.approx(expected, abs=0.1)
+    assert few["high"] - few["low"] == pytest.approx(expected, abs=0.1)
 
 
 @pytest.mark.parametrize("n_units", [1, 3, 4])
@@ -79,7 +79,7 @@ def test_few_units_have_no_interval(n_units):
     confusion = np.ones((1, n_units, 2, 2), dtype=int)
     resampling = {"n_bootstrap": 100, "rng": np.random.default_rng(0)}
     ratio = ratio_with_interval("balanced_accuracy", confusion, confusion, **resampling)
-    score = asdict(accuracy_with_interval(confusion))
+    score = accuracy_with_interval(confusion)
     few = n_units < LEAST_UNITS
     for result in (score, ratio):
         assert (result["low"] is None) == (result["high"] is None) == few
@@ -108,7 +108,7 @@ def test_interval_covers_the_truth_about_as_often_as_it_promises():
         right = rng.binomial(10, np.clip(rng.normal(0.7, 0.1, 20), 0, 1))
         counts = np.stack([right, 10 - right, 0 * right, 0 * right], axis=1)
         score = accuracy_with_interval(counts.reshape(1, 20, 2, 2), 400, rng=rng)
-        covered += score.low <= 0.7 <= score.high
+        covered += score["low"] <= 0.7 <= score["high"]
     assert 0.85 < covered / 100 < 1.0
 
 
@@ -121,8 +121,8 @@ def test_interval_of_a_shuffle_covers_the_luck_of_its_names_but_not_a_leak(namin
         return accuracy_with_interval(np.array(counts), 2000, shuffled=True)
 
     score = interval(naming)
-    assert score.low - 0.01 < 0.25 < score.high + 0.01
-    assert interval(*[[0, 1, 2, 3]] * 3).low > 0.25
+    assert score["low"] - 0.01 < 0.25 < score["high"] + 0.01
+    assert interval(*[[0, 1, 2, 3]] * 3)["low"] > 0.25
 
 
 def task_on(**changes):
@@ -199,11 +199,11 @@ def test_all_features_at_a_rate_that_holds_no_mesh_band_are_nan():
     assert not unknown["fm0_pinion"]
 
 
-def test_features_do_not_depend_on_threads_or_cache():
+def test_features_do_not_depend_on_the_cache():
     task = task_on(n_units=4, records_per_unit=4)
     segments = subset_segments(task, "by_unit", "train")
     cache = {}
-    first = feature_table(task, segments, cache=cache, n_threads=2).values
+    first = feature_table(task, segments, cache=cache).values
     assert len(cache) == segments.record.size
     assert_array_equal(first, feature_table(task, segments, cache=cache).values)
     assert_array_equal(first, feature_table(task, segments).values)

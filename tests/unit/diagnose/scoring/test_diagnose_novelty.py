@@ -15,10 +15,11 @@ from scipy.stats import norm
 from small_studies import LEARNS, TINY_CNN, plan_of, run, study_of, train, windows_of
 
 from diagnose.data.windows import SUBSETS, subset_segments
-from diagnose.scoring.alarm_threshold import alarm_threshold
+from diagnose.scoring.alarms import alarm_threshold
+from diagnose.scoring.predictions import Prediction, Rows
 from diagnose.studies import novelty
 from diagnose.studies.jobs import Job
-from diagnose.studies.novelty import NoveltyRun, network_outputs, trained_runs
+from diagnose.studies.novelty import network_outputs, trained_runs
 from diagnose.studies.novelty_metrics import (
     false_positive_rate_95,
     novelty_protocol_result,
@@ -48,9 +49,7 @@ def studies():
         plan = plan_of(task, settings)
         runs = run(task, settings, *plan.jobs)
         results[name] = {
-            protocol: novelty_protocol_result(
-                task, protocol, runs, n_bootstrap=100, seed=0
-            )
+            protocol: novelty_protocol_result(task, protocol, runs, n_bootstrap=100)
             for protocol in plan.protocols
         }
     return results
@@ -112,12 +111,16 @@ def labelled():
         "method": "m",
         "detail": "",
         "record": record,
-        "validation_score": np.linspace(0, 1, 40),
+        "parts": {
+            "validation": Rows(
+                record=np.arange(40), answers=np.linspace(0, 1, 40)[:, None]
+            )
+        },
     }
 
-    def judge(*scores, predicted=None):
+    def judge(*scores, **further):
         runs = [
-            NoveltyRun(seed=seed, score=score, predicted=predicted, **same)
+            Prediction(seed=seed, answers=score[:, None], further=further, **same)
             for seed, score in enumerate(scores)
         ]
         return novelty_result(
@@ -133,7 +136,7 @@ def labelled():
 
 def test_perfect_and_empty_scores(labelled):
     judge, novel, _, record = labelled
-    perfect = judge(novel * 5.0, predicted=record)
+    perfect = judge(novel * 5.0, known_classes=record)
     assert perfect["auroc"]["low"] == perfect["auroc"]["mean"] == 1
     assert perfect["false_alarms"]["mean"] == perfect["fpr95"]["mean"] == 0
     for found in perfect["found"].values():
@@ -142,7 +145,7 @@ def test_perfect_and_empty_scores(labelled):
 
     empty = judge(
         np.zeros(novel.size),
-        predicted=record,
+        known_classes=record,
     )
     assert {empty["auroc"][key] for key in ("mean", "low", "high")} == {0.5}
     assert empty["fpr95"]["mean"] == 1
@@ -267,8 +270,8 @@ def test_scores_of_a_classifier_are_those_of_its_probabilities_and_outputs(
         energy.append(-logsumexp(of_record, axis=1).mean())
 
     assert np.ptp(doubt) > 1e-3
-    assert_allclose(runs["largest_probability"].score, doubt, atol=1e-5)
-    assert_allclose(runs["energy"].score, energy, rtol=1e-4)
+    assert_allclose(runs["largest_probability"].answers[:, 0], doubt, atol=1e-5)
+    assert_allclose(runs["energy"].answers[:, 0], energy, rtol=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -379,7 +382,7 @@ def test_two_processes_give_the_results_of_one(open_study):
     ]
     serial, parallel = (run(task, settings, *jobs, n_workers=n) for n in (1, 2))
 
-    assert sum(isinstance(result, NoveltyRun) for result in serial) == 9
+    assert sum(result.protocol != "by_unit" for result in serial) == 9
     for first, second in zip(serial, parallel, strict=True):
         np.testing.assert_equal(*map(dataclasses.asdict, (first, second)))
 

@@ -40,17 +40,17 @@ def detected(is_found, *, n_units=20, sizes=None, threshold=True):
     score = np.concatenate([healthy, np.where(is_found, 50.0, -50.0)])[None]
     judged = Judged(
         method="cnn",
-        label=label,
+        truth=label,
         unit=unit,
         machines=Machines.alone(n_units),
-        log_probability=scores_apart(score),
+        answers=scores_apart(score),
     )
     healthy_elsewhere = Judged(
         method="cnn",
-        label=np.zeros(400, dtype=int),
+        truth=np.zeros(400, dtype=int),
         unit=np.arange(400) % 20,
         machines=Machines.alone(20),
-        log_probability=scores_apart(default_rng(5).normal(size=(1, 400))),
+        answers=scores_apart(default_rng(5).normal(size=(1, 400))),
     )
     if sizes is None:
         sizes = {"severity": SEVERITY, "crack_depth_mm": 4.0 * SEVERITY}

@@ -8,7 +8,8 @@ from numpy.testing import assert_array_equal
 from small_studies import task_on
 
 from diagnose.report.text import resampled_sentence, score_cell
-from diagnose.scoring.judged import spread_text
+from diagnose.scoring.intervals import percentile_interval, spread_text
+from diagnose.scoring.judged import class_scores, judged_answers
 from diagnose.scoring.machines import (
     Grouping,
     Machines,
@@ -16,8 +17,7 @@ from diagnose.scoring.machines import (
     machines_of,
     units_drawn,
 )
-from diagnose.scoring.metrics import percentile_interval, score_with_interval
-from diagnose.studies.protocol_results import score_predictions
+from diagnose.scoring.metrics import score_with_interval
 
 
 def dataset_of(gears, gearboxes, **options):
@@ -88,7 +88,8 @@ def test_too_few_of_either_kind_give_no_interval_and_say_so():
     """Two sets of gears in four gearboxes are eight machines, and two sets of gears."""
     dataset = dataset_of(*crossed(2, 4))
     task, record = task_on(dataset), np.arange(dataset.n_records)
-    scores = score_predictions(task, [(record, task.labels())], 100)
+    right = judged_answers(task, "cnn", record, np.eye(4)[task.labels()][None])
+    scores = class_scores(right, task.class_names, 100)
     score = scores["balanced_accuracy"]
     assert score["low"] is score["high"] is None
     assert score_cell(scores) == "1.00 [too few sets of gears]"
@@ -153,7 +154,7 @@ def test_a_score_is_resampled_by_its_machines():
             rng=default_rng(0),
             machines=machines,
         )
-        return score.high - score.low
+        return score["high"] - score["low"]
 
     assert width(None) == width(Machines.alone(16))
     assert width(shared) == pytest.approx(np.sqrt(2) * width(None), rel=0.15)

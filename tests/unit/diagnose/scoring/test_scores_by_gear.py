@@ -22,7 +22,7 @@ def network_that_misses(task, gear):
         method="tooth",
         seed=0,
         record=np.arange(label.size),
-        log_probability=np.log(np.eye(len(task.class_names))[named] + 1e-9),
+        answers=np.log(np.eye(len(task.class_names))[named] + 1e-9),
         detail="",
     )
 

@@ -11,6 +11,7 @@ from fake_dataset import FakeDataset
 from small_studies import study_of
 
 from diagnose.networks.domain import Domain
+from diagnose.scoring.hours import LifeFacts
 from diagnose.scoring.predictions import Prediction, Rows
 from diagnose.studies.jobs import Job, run_jobs
 from diagnose.studies.kept_jobs import (
@@ -21,7 +22,6 @@ from diagnose.studies.kept_jobs import (
 )
 from gensig.errors import DatasetError
 
-KINDS = (Prediction, Rows, Domain)
 JOBS = [Job(protocols=("by_unit",), seed=seed) for seed in (0, 1, 2)]
 
 
@@ -30,7 +30,7 @@ def outcome(seed):
     rng = np.random.default_rng(seed)
     scores = np.asfortranarray(rng.normal(size=(4, 3)))
     scores[0, 0] = -np.inf
-    rows = Rows(record=np.arange(4), log_probability=scores[:, ::-1])
+    rows = Rows(record=np.arange(4), answers=scores[:, ::-1])
     weights = {
         "a": rng.normal(size=(2, 3)).astype(np.float32),
         "n": np.array(7, dtype=np.int64),
@@ -41,10 +41,21 @@ def outcome(seed):
         method="méthode \u202e",
         seed=seed,
         record=np.arange(4, dtype=np.int32),
-        log_probability=scores,
+        answers=scores,
         detail="",
-        validation=rows,
-        windows=None,
+        parts={"validation": rows},
+        further={
+            "severity": np.array([np.nan, 1e-310]),
+            "odd": np.array([True, False]),
+        },
+        n_followed=None,
+        hours=LifeFacts(
+            method="cnn",
+            early_life_h=1 / 3,
+            half_width_h=0.1,
+            coverage=0.8,
+            n_calibration_lives=3,
+        ),
         weights=weights,
         domain=Domain(
             levels=np.ones((2, 2), np.float32), threshold=0.1, n_validation_windows=3
@@ -52,9 +63,6 @@ def outcome(seed):
         best_epoch=2,
         validation_loss=(0.1, float("nan"), 1 / 3, np.float64(0.3)),
         temperature=float("inf"),
-        last_predicted=np.array([True, False]),
-        heads={"severity": np.array([np.nan, 1e-310])},
-        n_followed=None,
     )
 
 
@@ -79,7 +87,7 @@ def same(first, second):
 
 @pytest.fixture
 def kept(tmp_path):
-    return KeptJobs(folder=tmp_path, digest="d", kinds=KINDS)
+    return KeptJobs(folder=tmp_path, digest="d")
 
 
 def test_what_is_kept_comes_back_bit_for_bit(kept):
@@ -89,13 +97,13 @@ def test_what_is_kept_comes_back_bit_for_bit(kept):
     assert not same({"a": 1}, {"a": 1.0})
     # a second time it is the same in memory too: what is summed is summed in the same order
     (again,) = keep_outcomes(kept, JOBS[1], [back])
-    assert again.log_probability.strides == back.log_probability.strides
+    assert again.answers.strides == back.answers.strides
     assert kept_outcomes(kept, JOBS[0]) is None
 
 
 def test_no_object_is_kept(kept):
     for value in (np.array([{}], dtype=object), {1, 2}, lambda: 1):
-        odd = replace(outcome(0), heads={"a": value})
+        odd = replace(outcome(0), further={"a": value})
         with pytest.raises(TypeError, match="cannot be kept"):
             keep_outcomes(kept, JOBS[0], [odd])
     assert list(kept.folder.iterdir()) == []

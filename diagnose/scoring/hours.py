@@ -1,19 +1,21 @@
-"""Facts of a stored network of remaining lives: its hours, intervals and inputs."""
+"""Hours of a trained method: level at which lives are cut, intervals, and further inputs."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
-from diagnose.scoring.life_scores import intervals_hold
-from diagnose.training.description_checks import LIFE, LIFE_COLUMNS
+import numpy as np
+
+from diagnose.data.windows import FloatArray
 
 AGE = "life_time_h"
+# columns that a network of remaining lives may take beside the signal
+LIFE_COLUMNS = ("speed_rpm", "torque_nm", AGE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LifeFacts:
-    """Hours, intervals and inputs of a network; ``remaining_life`` in ``model.json``.
+    """Hours, intervals and inputs of a method; of a network ``remaining_life`` in ``model.json``.
 
     Attributes
     ----------
@@ -31,8 +33,8 @@ class LifeFacts:
     half_width_h: float
     coverage: float
     n_calibration_lives: int
-    told: tuple[str, ...]
-    told_range: dict[str, tuple[float, float]]
+    told: tuple[str, ...] = ()
+    told_range: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         is_level = 0 < self.early_life_h < float("inf")
@@ -56,6 +58,17 @@ class LifeFacts:
         return intervals_hold(self.n_calibration_lives, self.coverage)
 
 
-def life_facts(name: str, value: Any) -> LifeFacts:
-    """Facts of the content of ``model.json``."""
-    return LifeFacts(**LIFE(name, value))
+def interval(
+    predicted: FloatArray, half_width: float, early_life: float
+) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper ends in h about predictions, (...) each.
+
+    The early level stands for itself and all longer lives.
+    """
+    low = np.maximum(predicted - half_width, 0.0)
+    return low, np.minimum(predicted + half_width, early_life)
+
+
+def intervals_hold(n_lives: int, coverage: float) -> bool:
+    """True if the calibration lives are enough for a coverage, see `conformal_half_width`."""
+    return bool((n_lives + 1) * (1 - coverage) >= 1 - 1e-9)
