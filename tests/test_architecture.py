@@ -376,7 +376,7 @@ def test_module_names_are_unique(package: str) -> None:
 # the doors: what reaches a terminal is escaped, and no cell of a table is a formula
 DOORS = {
     "gensig/terminal/printing.py": {"print"},
-    "gensig/commands/new/gearbox.py": {"input"},  # questions of its own
+    "gensig/commands/new/asking.py": {"input"},  # questions of its own
     "gensig/text/csv_tables.py": {"csv.reader", "csv.writer"},
 }
 PRINTING = {"print", "input", "pprint.pprint", "rich.print", "sys.excepthook"}
