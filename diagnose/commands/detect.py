@@ -5,14 +5,8 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from diagnose.commands.parser import (
-    add_healthy_speed,
-    add_recording_options,
-    add_recordings,
-    add_sampling_rate,
-    add_tacho,
-)
-from gensig.terminal.printing import show, show_text
+from diagnose.commands.parser import add_shared, add_tacho, described, show_json
+from gensig.terminal.printing import show
 
 if TYPE_CHECKING:
     from diagnose.detection.followed_shafts import FollowedRecording
@@ -36,7 +30,7 @@ EXITS = {0: "healthy", CHANGED: "at least one recording is changed"}
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of the verb."""
-    add_recordings(parser)
+    add_shared(parser, "recording")
     parser.add_argument(
         "--healthy",
         metavar="FILE",
@@ -60,7 +54,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="DRIVING DRIVEN of every stage, from the input on",
     )
     _add_speed(parser)
-    add_recording_options(parser)
+    add_shared(parser, "--channels", "--unit", "--array")
     parser.add_argument(
         "--other-load",
         action="store_true",
@@ -73,7 +67,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         metavar="SHARE",
         help="of healthy recordings (default: 0.05)",
     )
-    parser.add_argument("--json", action="store_true", help="print everything as JSON")
+    add_shared(parser, "--json")
 
 
 def _add_speed(parser: ArgumentParser) -> None:
@@ -84,14 +78,13 @@ def _add_speed(parser: ArgumentParser) -> None:
         metavar="RPM",
         help="of the input shaft, within 3 %%; not needed with --tacho",
     )
-    add_healthy_speed(parser)
-    add_sampling_rate(parser)
+    add_shared(parser, "--healthy-speed-rpm", "--sampling-rate")
     add_tacho(parser, "input")
 
 
 def run(arguments: Namespace) -> int:
     """Print the findings; exit status 3 if a recording is changed."""
-    from diagnose.detection.finding_text import finding_content, finding_lines
+    from diagnose.detection.finding import finding_content, finding_lines
     from diagnose.detection.gear_stages import stages_of
     from diagnose.detection.healthy_machine import HealthyMachine
 
@@ -111,11 +104,7 @@ def run(arguments: Namespace) -> int:
         for one in recordings
     ]
     if arguments.json:
-        import json
-
-        contents = [finding_content(finding) for finding in findings]
-        printed = contents[0] if len(contents) == 1 else contents
-        show_text(json.dumps(printed, indent=2, allow_nan=False))
+        show_json([finding_content(finding) for finding in findings])
     else:
         for finding in findings:
             show(*finding_lines(finding))
@@ -131,22 +120,9 @@ def _followed(
     stages: GearStages,
 ) -> list[FollowedRecording]:
     """Recordings as they are described, followed over the angle."""
-    from diagnose.detection.described import follow_file
-    from diagnose.recordings.source import Source
+    from diagnose.detection.followed_shafts import follow_file
 
     return [
-        follow_file(
-            Source(
-                file=file,
-                sampling_rate=arguments.sampling_rate,
-                speed_rpm=speed_rpm,
-                tacho=arguments.tacho,
-                pulses_per_turn=arguments.pulses_per_turn,
-                channels=arguments.channels and tuple(arguments.channels),
-                unit=arguments.unit,
-                array=arguments.array,
-            ),
-            stages,
-        )
+        follow_file(described(arguments, file, speed_rpm=speed_rpm), stages)
         for file in files
     ]

@@ -51,6 +51,7 @@ def run(arguments: Namespace) -> int:
         refuse_existing(Path(out))
     from diagnose.recordings.evaluate import evaluate_network
     from diagnose.recordings.registry import open_network, shipped_network
+    from diagnose.studies.result_files import write_metrics
     from gensig.dataset.reader import open_dataset
 
     channels = None
@@ -59,17 +60,18 @@ def run(arguments: Namespace) -> int:
     folder = arguments.model or shipped_network()
     network = open_network(folder)
     note_unsigned(folder, network.description)
-    evaluation = evaluate_network(
+    result, scores = evaluate_network(
         network,
         open_dataset(values["data"]),
         protocol=values.get("protocol"),
         subset=values.get("subset"),
         channels=channels,
     )
-    show(*network.lines(evaluation.result))
+    show(*network.lines(result))
     if out is not None:
         Path(out).mkdir(parents=True, exist_ok=True)
-        evaluation.write(Path(out))
+        write_metrics(Path(out), result)
+        scores.write(Path(out), result)
     return 0
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gensig.errors import DatasetError
-from gensig.terminal.printing import remark
+from gensig.terminal.printing import remark, show_text
 
 if TYPE_CHECKING:
+    from diagnose.recordings.source import Source
     from diagnose.training.store import ModelDescription
 
 
@@ -26,70 +28,81 @@ def add_model(parser: ArgumentParser, *, required: bool = True) -> None:
     parser.add_argument("--model", required=required, metavar="DIR", help=text)
 
 
-def add_recordings(parser: ArgumentParser) -> None:
-    """Add the recordings that are looked at."""
-    parser.add_argument(
-        "recording",
-        metavar="RECORDING",
-        nargs="+",
-        help="one or more: .csv, .wav, .npy, .npz, .h5, .hdf5 or .mat",
-    )
+# Arguments that verbs share, by their names.
+ARGUMENTS: dict[str, dict[str, Any]] = {
+    "recording": {
+        "metavar": "RECORDING",
+        "nargs": "+",
+        "help": "one or more: .csv, .wav, .npy, .npz, .h5, .hdf5 or .mat",
+    },
+    "--sampling-rate": {
+        "type": float,
+        "metavar": "HZ",
+        "help": "samples a second, where the file is silent",
+    },
+    "--healthy-speed-rpm": {
+        "type": float,
+        "metavar": "RPM",
+        "help": "of the healthy recordings (default: --speed-rpm)",
+    },
+    "--pulses-per-turn": {
+        "type": int,
+        "default": 1,
+        "metavar": "N",
+        "help": "of --tacho (default: 1)",
+    },
+    "--channels": {
+        "nargs": "+",
+        "metavar": "NAME",
+        "help": "of the file; a model takes them in its order",
+    },
+    "--unit": {
+        "default": "m/s2",
+        "help": "m/s2 or g, where the column does not say (default: m/s2)",
+    },
+    "--array": {
+        "metavar": "NAME",
+        "help": "array of .npz, .h5 or .mat files (default: acceleration)",
+    },
+    "--json": {"action": "store_true", "help": "print everything as JSON"},
+}
 
 
-def add_sampling_rate(parser: ArgumentParser) -> None:
-    """Add the rate of recordings that do not tell theirs."""
-    parser.add_argument(
-        "--sampling-rate",
-        type=float,
-        metavar="HZ",
-        help="samples a second, where the file is silent",
-    )
-
-
-def add_healthy_speed(parser: ArgumentParser) -> None:
-    """Add the speed of healthy recordings."""
-    parser.add_argument(
-        "--healthy-speed-rpm",
-        type=float,
-        metavar="RPM",
-        help="of the healthy recordings (default: --speed-rpm)",
-    )
+def add_shared(parser: ArgumentParser, *names: str) -> None:
+    """Add some of `ARGUMENTS`."""
+    for name in names:
+        parser.add_argument(name, **ARGUMENTS[name])
 
 
 def add_tacho(parser: ArgumentParser, shaft: str) -> None:
     """Add the channel with the pulses of a shaft, which the help names."""
-    parser.add_argument(
-        "--tacho",
-        metavar="CHANNEL",
-        help=f"pulses of the {shaft} shaft, to follow its speed",
-    )
-    parser.add_argument(
-        "--pulses-per-turn",
-        type=int,
-        default=1,
-        metavar="N",
-        help="of --tacho (default: 1)",
+    text = f"pulses of the {shaft} shaft, to follow its speed"
+    parser.add_argument("--tacho", metavar="CHANNEL", help=text)
+    add_shared(parser, "--pulses-per-turn")
+
+
+def described(arguments: Namespace, file: str, **further: Any) -> Source:
+    """A recording as the arguments describe it."""
+    from diagnose.recordings.source import Source
+
+    return Source(
+        file=file,
+        sampling_rate=arguments.sampling_rate,
+        tacho=arguments.tacho,
+        pulses_per_turn=arguments.pulses_per_turn,
+        channels=arguments.channels and tuple(arguments.channels),
+        unit=arguments.unit,
+        array=arguments.array,
+        **further,
     )
 
 
-def add_recording_options(parser: ArgumentParser) -> None:
-    """Add options on how a recording is read."""
-    parser.add_argument(
-        "--channels",
-        nargs="+",
-        metavar="NAME",
-        help="of the file; a model takes them in its order",
-    )
-    parser.add_argument(
-        "--unit",
-        default="m/s2",
-        help="m/s2 or g, where the column does not say (default: m/s2)",
-    )
-    parser.add_argument(
-        "--array",
-        metavar="NAME",
-        help="array of .npz, .h5 or .mat files (default: acceleration)",
-    )
+def show_json(results: Sequence[Mapping[str, Any]]) -> None:
+    """Print results as JSON, a single one by itself."""
+    import json
+
+    printed = results[0] if len(results) == 1 else results
+    show_text(json.dumps(printed, indent=2, allow_nan=False))
 
 
 def note_unsigned(folder: str | Path, description: ModelDescription) -> None:

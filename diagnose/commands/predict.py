@@ -7,16 +7,15 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from diagnose.commands.parser import (
-    add_healthy_speed,
     add_model,
-    add_recording_options,
-    add_recordings,
-    add_sampling_rate,
+    add_shared,
     add_tacho,
+    described,
     note_unsigned,
+    show_json,
 )
 from gensig.errors import ConfigError
-from gensig.terminal.printing import remark, show, show_text
+from gensig.terminal.printing import remark, show
 
 if TYPE_CHECKING:
     from diagnose.recordings.source import Source
@@ -51,10 +50,10 @@ EXITS = {
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of the verb."""
-    add_recordings(parser)
+    add_shared(parser, "recording")
     add_model(parser, required=False)
     _add_rotation(parser)
-    add_recording_options(parser)
+    add_shared(parser, "--channels", "--unit", "--array")
     parser.add_argument(
         "--held-out",
         action="store_true",
@@ -94,12 +93,12 @@ def _add_healthy(parser: ArgumentParser) -> None:
         default=[],
         help="of the same machine when healthy, for models with_reference",
     )
-    add_healthy_speed(parser)
+    add_shared(parser, "--healthy-speed-rpm")
 
 
 def _add_rotation(parser: ArgumentParser) -> None:
     """Add the arguments on rates, speeds and order tracking."""
-    add_sampling_rate(parser)
+    add_shared(parser, "--sampling-rate")
     parser.add_argument(
         "--speed-rpm",
         type=float,
@@ -159,12 +158,7 @@ def run(arguments: Namespace) -> int:
         if not arguments.json:
             show(network.line(result) + _held_out_text(arguments, result))
     if arguments.json:
-        import json
-
-        printed: Any = results
-        if len(results) == 1:
-            printed = results[0]
-        show_text(json.dumps(printed, indent=2, allow_nan=False))
+        show_json(results)
     if any(result["out_of_distribution"] for result in results):
         return OUT_OF_DISTRIBUTION
     return 0
@@ -174,21 +168,14 @@ def _sources(arguments: Namespace) -> list[Source]:
     """Recordings as they are described, with the healthy ones of the same machine."""
     from dataclasses import replace
 
-    from diagnose.recordings.source import Source
-
-    described = [
-        Source(
-            file=recording,
-            sampling_rate=arguments.sampling_rate,
+    sources = [
+        described(
+            arguments,
+            recording,
             speed_rpm=arguments.speed_rpm,
             teeth=arguments.teeth and tuple(arguments.teeth),
-            tacho=arguments.tacho,
-            pulses_per_turn=arguments.pulses_per_turn,
             as_recorded=arguments.as_recorded,
             to_speed_rpm=arguments.to_speed,
-            channels=arguments.channels and tuple(arguments.channels),
-            unit=arguments.unit,
-            array=arguments.array,
             torque_nm=arguments.torque_nm,
             life_time_h=arguments.life_time_h,
             held_out=arguments.held_out,
@@ -204,7 +191,7 @@ def _sources(arguments: Namespace) -> list[Source]:
                 for file in arguments.healthy
             ),
         )
-        for source in described
+        for source in sources
     ]
 
 

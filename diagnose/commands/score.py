@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from gensig.terminal.printing import remark, show, show_text
+from diagnose.commands.parser import add_shared, show_json
+from gensig.terminal.printing import remark, show
 
 HELP = """\
 Score your predictions on a data set's split, by the scorer of diagnose train.
@@ -36,7 +36,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         metavar="NAME",
         help="of a file without that column (default: by_unit)",
     )
-    parser.add_argument("--json", action="store_true", help="print everything as JSON")
+    add_shared(parser, "--json")
 
 
 def run(arguments: Namespace) -> int:
@@ -52,7 +52,7 @@ def run(arguments: Namespace) -> int:
         dataset, Path(arguments.predictions), protocol=arguments.protocol
     )
     if arguments.json:
-        show_text(json.dumps(result, indent=2, allow_nan=False))
+        show_json([result])
         return 0
     benchmark = result["benchmark"]
     if benchmark is not None:

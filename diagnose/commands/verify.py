@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from gensig.terminal.printing import show, show_text
+from diagnose.commands.parser import add_shared, show_json
+from gensig.terminal.printing import show
 
 HELP = """\
 Is a trained network whole and unaltered?
@@ -30,7 +30,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         nargs="?",
         help="folder of a network, or of a study (default: the network that comes with gensig)",
     )
-    parser.add_argument("--json", action="store_true", help="print everything as JSON")
+    add_shared(parser, "--json")
 
 
 def run(arguments: Namespace) -> int:
@@ -43,9 +43,7 @@ def run(arguments: Namespace) -> int:
         folder = Path(arguments.model)
     checks = [check_model(path) for path in models_in(folder)]
     if arguments.json:
-        contents = [check.content() for check in checks]
-        printed = contents[0] if len(contents) == 1 else contents
-        show_text(json.dumps(printed, indent=2, allow_nan=False))
+        show_json([check.content() for check in checks])
     else:
         for check in checks:
             for line in (*check.problems, *check.notes):

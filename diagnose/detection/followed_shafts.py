@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from diagnose.data.tracking import Tracked, track_by_tacho
 from diagnose.detection.gear_stages import GearStages
 from diagnose.detection.stage_comb import Candidate, SpeedSearch, search_speed
+from diagnose.recordings.source import Source, read_source
 from gensig.errors import ConfigError, TooShortError
 from gensig.signals.averaging import samples_per_turn_for
 from gensig.signals.mesh_motion import Teeth, find_motion, in_hertz
-from gensig.signals.recording import Recording
+from gensig.signals.recording import Recording, recording_of
 from gensig.signals.resampling import PASS_SHARE
 from gensig.signals.rotation import resample_by_angle
 from gensig.signals.speed_ridge import wandering_mesh_cycles
@@ -121,6 +122,25 @@ def follow_shafts(
     turned = cycles / stages.mesh_orders[stage]
     by = f"the mesh of stage {stage + 1}" if stages.n_stages > 1 else "the mesh"
     return _over_angle(recording, turned, name, by)
+
+
+def follow_file(source: Source, stages: GearStages) -> FollowedRecording:
+    """Read a recording and follow its input shaft.
+
+    Raises
+    ------
+    ConfigError    for a file that cannot be used, and as `follow_shafts`
+    """
+    content, pulses = read_source(source)
+    recording = recording_of(content, unit=source.unit, channels=source.channels)
+    tacho = None
+    if pulses is not None and source.tacho is not None:
+        tacho = Tacho(
+            name=source.tacho, signal=pulses, pulses_per_turn=source.pulses_per_turn
+        )
+    return follow_shafts(
+        recording, stages, source.speed_rpm, name=source.file, tacho=tacho
+    )
 
 
 def check_turns(

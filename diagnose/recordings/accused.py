@@ -1,8 +1,9 @@
-"""The tooth of a recording that a network accuses, with what shows why."""
+"""The tooth that a network accuses, with what shows why: of a recording, and of test records."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,18 +12,24 @@ import torch
 from diagnose.data.packed_turns import tooth_counts
 from diagnose.data.targets import GEARS
 from diagnose.data.turns import Turns
-from diagnose.data.windows import HEALTHY, FloatArray
+from diagnose.data.windows import HEALTHY, FloatArray, subset_segments
 from diagnose.networks.network import SiteNetwork
 from diagnose.recordings.prepared import prepare_recording
 from diagnose.recordings.source import Source
+from diagnose.recordings.stored_classifier import StoredClassifier
 from diagnose.recordings.stored_network import require_finite
-from diagnose.report.tooth_figure import AccusedTooth
+from diagnose.report.headlines import headline_protocol
+from diagnose.report.tooth_figure import AccusedTooth, tooth_figure
+from diagnose.studies.result_files import Content
 from gensig.errors import ConfigError
+from gensig.text.csv_tables import read_records
 
 if TYPE_CHECKING:
-    from diagnose.data.windows import WindowSet
+    from diagnose.data.windows import Task, WindowSet
     from diagnose.recordings.stored_network import StoredNetwork
 
+MOST_PICTURES = 5
+PREDICTIONS = "predictions.csv"
 NO_TEETH = "--plot shows the teeth of a gear, which this model does not score: model=tooth does"
 
 
@@ -93,3 +100,68 @@ def _log_odds(scores: torch.Tensor, class_names: tuple[str, ...]) -> FloatArray:
     at_site = probability[:, faulty].sum(dim=1).numpy()
     tiny = np.finfo(float).tiny
     return np.log(at_site + tiny) - np.log1p(-np.minimum(at_site, 1 - 1e-12))
+
+
+def found_fault_pictures(
+    folder: Path, task: Task, metrics: Content
+) -> list[tuple[str, str]]:
+    """Write the accused tooth of chosen test records as PNG files.
+
+    Parameters
+    ----------
+    folder : of a finished study, with its models and predictions
+    task : of the study
+    metrics : content of its ``metrics.json``; the protocol of the headlines is shown
+
+    Returns
+    -------
+    (file, caption) of each picture; none for a network that scores no teeth
+    """
+    protocol, network = headline_protocol(metrics), metrics["model"]
+    models = sorted(folder.glob(f"models/{protocol}-seed*"))
+    if protocol is None or not models:
+        return []
+    model_folder = models[0]
+    stored = StoredClassifier.load(model_folder)
+    inputs = stored.inputs()
+    if not (isinstance(stored.model, SiteNetwork) and isinstance(inputs, Turns)):
+        return []
+    seed = model_folder.name.rpartition("-seed")[2]
+    with (folder / PREDICTIONS).open(newline="", encoding="utf-8") as file:
+        answered = [
+            row
+            for row in read_records(file)
+            if (row["protocol"], row["method"], row["seed"])
+            == (protocol, network, seed)
+        ]
+    part = task.part(protocol, "test")
+    segments = subset_segments(task, protocol, "test")
+    ids = np.asarray(task.dataset.column("record_id"))[segments.record].astype(str)
+    pictures = []
+    for number, row in enumerate(shown(answered), start=1):
+        record, truth = row["record_id"], row["label"]
+        stretch = np.flatnonzero(ids == record)[:1]
+        windows = inputs.load(part, segments.of(stretch))
+        accused = accused_of_turns(stored, windows, part.channel_names)
+        picture = f"tooth_{number}_{truth}.png"
+        caption = (
+            f"record {record}, truth {truth}, answer {row['predicted']}; {accused.gear}, "
+            f"tooth {accused.tooth}"
+        )
+        tooth_figure(folder / picture, accused, caption)
+        pictures.append((picture, caption))
+    return pictures
+
+
+def shown(answered: Sequence[Mapping[str, str]]) -> list[Mapping[str, str]]:
+    """The first found fault of each class, and the first wrong answer; `MOST_PICTURES` at most.
+
+    Both are rows of the table of predictions.
+    """
+    right = [row for row in answered if row["label"] == row["predicted"]]
+    wrong = [row for row in answered if row["label"] != row["predicted"]][:1]
+    found: dict[str, Mapping[str, str]] = {}
+    for row in right:
+        if row["label"] != HEALTHY:
+            found.setdefault(row["label"], row)
+    return [*list(found.values())[: MOST_PICTURES - len(wrong)], *wrong]

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from diagnose.data.at_rate import at_rate
 from diagnose.data.windows import Segments, Task, all_segments, subset_segments, task_of
 from diagnose.recordings.stored_network import Scores, StoredNetwork
-from diagnose.studies.result_files import write_metrics
 from diagnose.training.carried import refuse_seen
 from diagnose.training.store import ModelDescription, data_fingerprint, schema_version
 from gensig.dataset.schema import READABLE_VERSIONS
@@ -20,25 +18,6 @@ if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Evaluation:
-    """Result of a network on a data set.
-
-    Attributes
-    ----------
-    result : content of ``metrics.json``: scores with intervals, and what was judged
-    scores : of the network
-    """
-
-    result: dict[str, Any]
-    scores: Scores
-
-    def write(self, folder: Path) -> None:
-        """Write ``metrics.json`` and the files that belong to it."""
-        write_metrics(folder, self.result)
-        self.scores.write(folder, self.result)
-
-
 def evaluate_network(
     network: StoredNetwork,
     dataset: Dataset,
@@ -46,7 +25,7 @@ def evaluate_network(
     protocol: str | None = None,
     subset: str | None = None,
     channels: Sequence[str] | None = None,
-) -> Evaluation:
+) -> tuple[dict[str, Any], Scores]:
     """Score a network on a part of a data set.
 
     On the data set that it was trained on it is judged on the test part of its protocol; on
@@ -61,6 +40,10 @@ def evaluate_network(
     protocol, subset : part of a split of that data set
     channels : in place of those it was trained on, in their order
 
+    Returns
+    -------
+    content of ``metrics.json``, scores with intervals and what was judged; scores of the network
+
     Raises
     ------
     DatasetError    if schema version, sampling rate, channels, classes or columns do not fit, and
@@ -73,7 +56,7 @@ def evaluate_network(
     segments, part, shown = chosen_segments(task, description, protocol, subset)
     refuse_seen(description.carried, dataset, segments)
     scores = network.scores(shown, segments, part)
-    result = {
+    return {
         "data": str(dataset.folder),
         "part": part,
         **scores.counts,
@@ -84,8 +67,7 @@ def evaluate_network(
         "trained_on_protocol": description.protocol,
         "seed": description.seed,
         **scores.values,
-    }
-    return Evaluation(result=result, scores=scores)
+    }, scores
 
 
 def _matching_task(

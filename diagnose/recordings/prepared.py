@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from diagnose.data.inputs import NetworkInput, RecordedSignal, SoundSignal
 from diagnose.data.turns import Turns
 from diagnose.data.windows import WindowSet
-from diagnose.recordings.channels import chosen_channels, tacho_apart
 from diagnose.recordings.followed import (
     SPEED_TOLERANCE,
     at_nearest_rate,
@@ -28,21 +27,15 @@ from diagnose.recordings.plausible import (
     check_place,
     check_turns,
 )
-from diagnose.recordings.source import Source
+from diagnose.recordings.source import Source, chosen_channels, read_source
 from diagnose.training.carried import Stretch, digests_of, held_out_stretch
 from gensig.errors import ConfigError
-from gensig.signals.recording import (
-    Recording,
-    RecordingFile,
-    read_file,
-    recording_of,
-)
+from gensig.signals.recording import Recording, RecordingFile, recording_of
 
 if TYPE_CHECKING:
     from diagnose.data.tracking import Tracked
     from diagnose.training.store import ModelDescription
 
-RATE_OPTION = "--sampling-rate"
 SPEED_OPTION, HEALTHY_SPEED_OPTION = "--speed-rpm", "--healthy-speed-rpm"
 
 
@@ -347,13 +340,7 @@ def tracking_text(tracking: Mapping[str, Any] | None) -> str:
 
 def _read(description: ModelDescription, source: Source) -> _Read:
     """Recording with the network's channels in their order, and its tachometer."""
-    content = read_file(
-        source.file,
-        rate=source.sampling_rate,
-        array=source.array,
-        rate_option=RATE_OPTION,
-    )
-    content, tacho = tacho_apart(content, source.tacho)
+    content, tacho = read_source(source)
     chosen = source.channels or content.channels
     if not description.takes_each_channel:
         chosen = chosen_channels(content, description.channel_names, source.channels)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from diagnose.data.lives import lives_of
 from diagnose.data.windows import Task
-from diagnose.recordings.found_faults import found_fault_pictures
+from diagnose.recordings.accused import found_fault_pictures
 from diagnose.recordings.stored_classifier import StoredClassifier
 from diagnose.recordings.stored_life import StoredLife
 from diagnose.recordings.stored_network import StoredNetwork

@@ -1,11 +1,16 @@
-"""A recording as the user describes it."""
+"""A recording as the user describes it, and the channels of its file."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gensig.errors import ConfigError
+from gensig.signals.recording import RecordingFile, read_file, without_unit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,3 +79,78 @@ class Source:
         """True if enough is known to follow the speed."""
         by_mesh = self.teeth is not None and self.speed_rpm is not None
         return (self.tacho is not None or by_mesh) and not self.as_recorded
+
+
+def tacho_apart(
+    content: RecordingFile, tacho: str | None
+) -> tuple[RecordingFile, NDArray[np.float64] | None]:
+    """A file without the channel of its tachometer, and that channel; None where none is named.
+
+    Raises
+    ------
+    ConfigError    for a channel that is not there, or is the only one
+    """
+    if tacho is None:
+        return content, None
+    if tacho not in content.channels:
+        raise ConfigError(
+            f"{content.file}: no channel {tacho}; it has {', '.join(content.channels)}",
+        )
+    index = content.channels.index(tacho)
+    names = tuple(name for name in content.channels if name != tacho)
+    if not names:
+        raise ConfigError(f"{content.file}: there is no channel beside {tacho}")
+    others = np.delete(content.values, index, axis=0)
+    return replace(content, channels=names, values=others), content.values[index]
+
+
+def read_source(
+    source: Source,
+) -> tuple[RecordingFile, NDArray[np.float64] | None]:
+    """Content of the file of a recording without its tachometer, and that channel.
+
+    Raises
+    ------
+    ConfigError    for a file that cannot be read, and as `tacho_apart`
+    """
+    content = read_file(
+        source.file,
+        rate=source.sampling_rate,
+        array=source.array,
+        rate_option="--sampling-rate",
+    )
+    return tacho_apart(content, source.tacho)
+
+
+def chosen_channels(
+    content: RecordingFile,
+    wanted: Sequence[str],
+    given: Sequence[str] | None,
+) -> tuple[str, ...]:
+    """Channels of the file for those of the network.
+
+    As given, by name, or in order where no name says otherwise.
+
+    Raises
+    ------
+    ConfigError    for another number of channels, or names that say nothing
+    """
+    needs = f"the model takes {len(wanted)}, {', '.join(wanted)}"
+    if given is not None:
+        if len(given) != len(wanted):
+            raise ConfigError(
+                f"--channels names {len(given)} channel(s); {needs}: name as many, in this order",
+            )
+        return tuple(given)
+    by_name = {without_unit(name): name for name in content.channels}
+    if all(name in by_name for name in wanted):
+        return tuple(by_name[name] for name in wanted)
+    names = ", ".join(content.channels)
+    has = f"{content.file} has {len(content.channels)} channel(s), {names}"
+    if len(content.channels) != len(wanted):
+        raise ConfigError(f"{has}; {needs}: choose with --channels, in this order")
+    if content.named and len(wanted) > 1:
+        raise ConfigError(
+            f"{has}; {needs}: say which is which with --channels, in this order"
+        )
+    return content.channels

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from diagnose.data.lives import Lives, kept_segments, lives_of
 from diagnose.recordings.followed import SPEED_TOLERANCE
+from diagnose.recordings.onnx_export import N_CHECKED
 from diagnose.recordings.prepared import PreparedRecording
-from diagnose.recordings.raw_windows import N_CHECKED
 from diagnose.recordings.source import Source
 from diagnose.recordings.stored_network import (
     Answer,

@@ -170,14 +170,14 @@ def trained_runs(
     """
     if protocol != "healthy_only":
         return _classifier_runs(settings, protocol, seed, sets)
-    model = fit_autoencoder(
+    model, best_epoch = fit_autoencoder(
         sets["train"], sets["validation"], settings=settings, seed=seed
     )
     return [
         _run(
             protocol,
             "autoencoder",
-            f"best epoch {model.best_epoch}",
+            f"best epoch {best_epoch}",
             lambda subset: reconstruction_error(model, sets[subset]),
             sets,
             seed=seed,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -76,14 +75,6 @@ class WindowAutoencoder(nn.Module):
         return (self.decoder(self.encoder(scaled)) - scaled).square().mean(dim=1)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Autoencoder:
-    """A trained autoencoder in evaluation mode; `best_epoch` on the validation units, from 1."""
-
-    model: WindowAutoencoder
-    best_epoch: int
-
-
 def check_window_for_autoencoder(window_samples: int) -> None:
     """Refuse a window in which the code has no whole step.
 
@@ -100,7 +91,7 @@ def check_window_for_autoencoder(window_samples: int) -> None:
 
 def fit_autoencoder(
     train: WindowSet, validation: WindowSet, *, settings: TrainSettings, seed: int
-) -> Autoencoder:
+) -> tuple[WindowAutoencoder, int]:
     """Train on windows of known kind, up to the least error on other units of that kind.
 
     With patience 0 all epochs run and the weights of the last one are kept.
@@ -112,6 +103,10 @@ def fit_autoencoder(
     settings : epochs, patience, batch size, learning rate, device
     seed : decides initial weights, order and window starts; the same seed gives the same bits on
         the same processor
+
+    Returns
+    -------
+    autoencoder in evaluation mode, and its epoch, from 1
 
     Raises
     ------
@@ -151,11 +146,11 @@ def fit_autoencoder(
             "the autoencoder diverged before its last epoch; reduce learning_rate"
         )
     model.load_state_dict(best_weights)
-    return Autoencoder(model=model.cpu().eval(), best_epoch=best_epoch)
+    return model.cpu().eval(), best_epoch
 
 
 def reconstruction_error(
-    autoencoder: Autoencoder, windows: WindowSet, *, batch_size: int = 64
+    model: WindowAutoencoder, windows: WindowSet, *, batch_size: int = 64
 ) -> FloatArray:
     """(window,) largest mean squared error over `STRETCH` samples, at the planned starts.
 
@@ -167,7 +162,7 @@ def reconstruction_error(
     """
     largest = []
     for block in windows.blocks(batch_size):
-        error = _errors(autoencoder.model, torch.from_numpy(windows.cut(block)))
+        error = _errors(model, torch.from_numpy(windows.cut(block)))
         means = error.unfold(1, STRETCH, STRETCH // 2).mean(dim=2)
         largest.append(means.amax(dim=1))
     return torch.cat(largest).numpy().astype(float)

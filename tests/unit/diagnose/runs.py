@@ -77,6 +77,11 @@ def metrics_of(out):
     return json.loads((out / "metrics.json").read_text())
 
 
+def by_unit(out):
+    """Results of by_unit of a study."""
+    return metrics_of(out)["protocols"]["by_unit"]
+
+
 def rows_of(path):
     with path.open(encoding="utf-8") as file:
         return list(csv.DictReader(file))

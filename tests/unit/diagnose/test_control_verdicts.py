@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fake_dataset import FakeDataset
-from runs import FAST, metrics_of, train
+from runs import FAST, by_unit, metrics_of, train
 
 from diagnose.baselines.base import Baseline, MethodText, Role
 from diagnose.baselines.indicator_models import INDICATOR_INPUT
@@ -67,10 +67,6 @@ def study(out, *words):
             patch.setitem(BASELINES, name, cheat)
         patch.setattr(Knowing, "truth", dataset.columns["label"])
         return train(out, dataset, *WORDS, *words)
-
-
-def by_unit(out):
-    return metrics_of(out)["protocols"]["by_unit"]
 
 
 @pytest.fixture(scope="module")

@@ -168,7 +168,7 @@ def test_a_visible_fault_is_learnt_stored_evaluated_and_predicted(dataset, tmp_p
     save_model(tmp_path / "m", prediction.weights, description)
     network = open_network(tmp_path / "m")
     assert network.description.model["heads"] == ["severity", "gear"]
-    evaluated = evaluate_network(network, dataset).result
+    evaluated, _ = evaluate_network(network, dataset)
     assert evaluated["balanced_accuracy"]["mean"] > 0.8
 
     record, label = int(prediction.record[0]), prediction.predicted[0]

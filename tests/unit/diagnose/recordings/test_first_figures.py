@@ -5,7 +5,7 @@ import pytest
 from runs import NETWORK_ONLY, QUICK, metrics_of, train
 from small_studies import two_channels
 
-from diagnose.recordings.found_faults import MOST_PICTURES, Answered, shown
+from diagnose.recordings.accused import MOST_PICTURES, shown
 from diagnose.report.headlines import headline_protocol, headlines
 from diagnose.report.tooth_figure import AccusedTooth, tooth_figure
 from diagnose.training.sham import sham_method
@@ -46,7 +46,7 @@ def test_a_study_without_new_machines_has_no_headline():
 
 def answers(*pairs):
     return [
-        Answered(record_id=f"r{index}", truth=truth, answer=answer)
+        {"record_id": f"r{index}", "label": truth, "predicted": answer}
         for index, (truth, answer) in enumerate(pairs)
     ]
 
@@ -60,10 +60,10 @@ def test_the_first_found_fault_of_each_class_and_a_wrong_answer_are_shown():
         ("pitting", "healthy"),
         ("broken", "broken"),
     )
-    assert [answer.record_id for answer in shown(given)] == ["r2", "r5", "r1"]
+    assert [row["record_id"] for row in shown(given)] == ["r2", "r5", "r1"]
     many = answers(*((f"c{k}", f"c{k}") for k in range(9)), ("crack", "healthy"))
     assert len(shown(many)) == MOST_PICTURES
-    assert shown(many)[-1].truth == "crack"
+    assert shown(many)[-1]["label"] == "crack"
 
 
 def test_the_version_of_the_metrics_is_that_of_their_keys(tooth_study):

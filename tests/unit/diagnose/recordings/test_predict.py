@@ -307,36 +307,29 @@ def test_recordings_that_do_not_fit_are_refused(
     says(capsys, "predict", "--model", model, str(whole), status=3)
 
 
-def in_flag(**values):
-    return lambda content: content["out_of_distribution"].update(values)
+NO_MODEL = "does not describe a model"
+DESCRIPTIONS = [
+    ({"model_schema_version": 9}, "model schema 9, this program reads 1, 2 and 3"),
+    ({"sampling_rate_hz": "fast"}, NO_MODEL),
+    ({"temperature": 0}, NO_MODEL),
+    ({"temperature": "warm"}, NO_MODEL),
+    ({"class_names": ["healthy", "crack"]}, "does not fit model.json"),
+    ({"window_samples": 0}, "window_samples 0 is no whole number from 1"),
+    ({"speed_rpm_range": [1]}, NO_MODEL),
+    ({"flag": {"method": "guess"}}, "out-of-distribution flag is 'guess'"),
+    ({"flag": {"threshold": None}}, "flag is not whole"),
+    ({"flag": {"threshold": -1.0}}, "threshold of its out-of-distribution flag is -1"),
+]
 
 
-def setting(**values):
-    return lambda content: content.update(values)
+@pytest.mark.parametrize(("values", "message"), DESCRIPTIONS)
+def test_a_wrong_description_is_refused(values, message, model, tmp_path, capsys):
+    def change(content):
+        flag = content["out_of_distribution"] | values.get("flag", {})
+        flag = {key: value for key, value in flag.items() if value is not None}
+        content |= {**values, "out_of_distribution": flag}
+        content.pop("flag", None)
 
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (
-            setting(model_schema_version=9),
-            "model schema 9, this program reads 1, 2 and 3",
-        ),
-        (setting(sampling_rate_hz="fast"), "does not describe a model"),
-        (setting(temperature=0), "does not describe a model"),
-        (setting(temperature="warm"), "does not describe a model"),
-        (setting(class_names=["healthy", "crack"]), "does not fit model.json"),
-        (setting(window_samples=0), "window_samples 0 is no whole number from 1"),
-        (setting(speed_rpm_range=[1]), "does not describe a model"),
-        (in_flag(method="guess"), "out-of-distribution flag is 'guess'"),
-        (
-            lambda content: content["out_of_distribution"].pop("threshold"),
-            "flag is not whole",
-        ),
-        (in_flag(threshold=-1.0), "threshold of its out-of-distribution flag is -1"),
-    ],
-)
-def test_a_wrong_description_is_refused(change, message, model, tmp_path, capsys):
     tensors = load_file(f"{model}/model.safetensors")
     folder = copied(model, tmp_path, change, tensors)
     refuses(capsys, ["predict", "--model", folder, "r.npz"], message)
@@ -356,7 +349,7 @@ def test_wrong_tensors_are_refused(
     tensors = load_file(f"{model}/model.safetensors")
     levels = change(tensors["domain.levels"])
     tensors["domain.levels"] = np.ascontiguousarray(levels)
-    folder = copied(model, tmp_path, setting(), tensors)
+    folder = copied(model, tmp_path, lambda content: None, tensors)
     refuses(capsys, ["predict", "--model", folder, recorded(signals[0])], message)
 
 

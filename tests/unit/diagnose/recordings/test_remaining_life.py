@@ -10,7 +10,7 @@ from fake_lives import FakeLives
 from numpy.testing import assert_allclose, assert_array_equal
 from offline_pages import NOTHING, outward, sent_by
 from refusals import refused
-from runs import LIFE, metrics_of, refuses, rows_of, serve, settings_of, train
+from runs import LIFE, by_unit, refuses, rows_of, serve, settings_of, train
 from small_studies import plan_of, run
 
 from diagnose.baselines import life_models
@@ -312,10 +312,6 @@ def test_a_wrong_key_is_refused_in_one_line(
 
 
 # ---- what is learnt
-
-
-def by_unit(out):
-    return metrics_of(out)["protocols"]["by_unit"]
 
 
 ENDS = ("low_h", "predicted_h", "high_h")

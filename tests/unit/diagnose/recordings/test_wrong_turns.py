@@ -7,9 +7,8 @@ import pytest
 from refusals import refused
 from runs import model_of, refuses, says
 
-from diagnose.recordings.channels import tacho_apart
 from diagnose.recordings.followed import tracked_if_long
-from diagnose.recordings.source import Source
+from diagnose.recordings.source import Source, tacho_apart
 from gensig.signals.recording import Recording, RecordingFile
 
 RATE = 12800

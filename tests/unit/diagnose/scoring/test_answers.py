@@ -9,6 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from fake_dataset import CLASSES, FakeDataset
+from judged_tables import judged_table
 from numpy.testing import assert_allclose
 from small_studies import settings_of, task_on
 
@@ -22,8 +23,7 @@ from diagnose.report.answer_figures import (
 from diagnose.report.answer_tables import write_tables
 from diagnose.scoring.conditions import by_condition, condition_columns
 from diagnose.scoring.intervals import with_interval
-from diagnose.scoring.judged import Judged
-from diagnose.scoring.machines import Machines, Support
+from diagnose.scoring.machines import Support
 from diagnose.scoring.paired import compare, holm, permutation_p_value
 from diagnose.scoring.predictions import Prediction, Rows
 from diagnose.scoring.window_length import by_window_length
@@ -40,13 +40,7 @@ def scores_of(predicted, sure=5.0):
 
 
 def judged(predicted, label, unit, method="cnn"):
-    return Judged(
-        method=method,
-        truth=label,
-        unit=unit,
-        machines=Machines.alone(int(unit.max()) + 1),
-        answers=scores_of(np.atleast_2d(predicted)),
-    )
+    return judged_table(scores_of(np.atleast_2d(predicted)), label, unit, method)
 
 
 def records(n_units=12, per_unit=12):

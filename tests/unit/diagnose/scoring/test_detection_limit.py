@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from judged_tables import cracks_table, found_cracks
 from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from scipy.special import expit
@@ -13,26 +14,9 @@ from sklearn.metrics import roc_auc_score
 
 from diagnose.scoring.alarms import LEAST_HEALTHY, alarm_threshold
 from diagnose.scoring.detection_curve import curve_at, fit_curves, limits
-from diagnose.scoring.detection_limit import (
-    detection,
-    detection_score,
-    size_columns,
-)
+from diagnose.scoring.detection_limit import detection_score, size_columns
 from diagnose.scoring.intervals import exact_interval, share_with_interval
-from diagnose.scoring.judged import Judged
-from diagnose.scoring.machines import Machines, Support
-
-
-def judged(score, label, unit):
-    """Two classes with a given detection score, (seed, record)."""
-    score = np.atleast_2d(score)
-    return Judged(
-        method="cnn",
-        truth=label,
-        unit=unit,
-        machines=Machines.alone(int(unit.max()) + 1),
-        answers=np.stack([np.zeros_like(score), score], axis=-1),
-    )
+from diagnose.scoring.machines import Support
 
 
 def study(n_units=20, per_unit=20, shift=0.0, seed=0):
@@ -45,7 +29,7 @@ def study(n_units=20, per_unit=20, shift=0.0, seed=0):
     label = np.arange(unit.size) % 2
     severity = rng.uniform(0.1, 0.9, unit.size)
     score = rng.normal(size=(2, unit.size)) + label * (12 * severity - 4) + shift
-    return judged(score, label, unit), severity[label == 1]
+    return cracks_table(score, label, unit), severity[label == 1]
 
 
 @pytest.fixture(scope="module")
@@ -65,20 +49,14 @@ def validation():
 
 
 def answer(test, healthy_elsewhere, severity):
-    return detection(
-        test,
-        healthy_elsewhere,
-        class_names=("healthy", "crack"),
-        sizes={"crack": {"severity": severity, "crack_depth_mm": 4 * severity}},
-        n_bootstrap=200,
-        rng=default_rng(1),
-    )
+    sizes = {"severity": severity, "crack_depth_mm": 4 * severity}
+    return found_cracks(test, healthy_elsewhere, sizes, n_bootstrap=200)
 
 
 def crack_with(score, cracks):
     """Result of the cracks for other scores."""
     test, severity = cracks
-    other = judged(score, test.truth, test.unit)
+    other = cracks_table(score, test.truth, test.unit)
     return answer(other, held_back(), severity)["classes"]["crack"]
 
 
@@ -192,7 +170,7 @@ def test_the_share_of_resamples_is_of_the_resamples_alone():
     label = np.arange(unit.size) % 2
     severity = rng.uniform(0.1, 0.9, unit.size)
     score = rng.normal(size=(1, unit.size)) + label * (6 * severity - 3)
-    test = judged(score, label, unit)
+    test = cracks_table(score, label, unit)
     result = answer(test, held_back(), severity[label == 1])
     limits_of = result["classes"]["crack"]["limits"]
     counts = [200 * row["share_of_resamples_reached"] for row in limits_of]

@@ -302,7 +302,7 @@ def test_the_autoencoder_is_the_same_for_the_same_seed(healthy, open_study):
     validation, settings = healthy[1], open_study[1]
     state = torch.random.get_rng_state()
     first, second, other = (
-        fit_autoencoder(*healthy, settings=settings, seed=seed) for seed in (1, 1, 2)
+        fit_autoencoder(*healthy, settings=settings, seed=seed)[0] for seed in (1, 1, 2)
     )
 
     assert torch.equal(state, torch.random.get_rng_state())
@@ -315,28 +315,30 @@ def test_the_autoencoder_is_the_same_for_the_same_seed(healthy, open_study):
     assert not np.array_equal(error, reconstruction_error(other, validation))
 
 
+@pytest.fixture
+def fit_with(healthy, open_study, monkeypatch):
+    """Function that fits an autoencoder whose epochs have given errors on the validation."""
+
+    def fit(errors, patience):
+        given = iter(errors)
+        monkeypatch.setattr(
+            autoencoder, "_errors", lambda *_: torch.full((1, 1), next(given))
+        )
+        changes = {"epochs": len(errors), "patience": patience}
+        settings = dataclasses.replace(open_study[1], **changes)
+        return fit_autoencoder(*healthy, settings=settings, seed=0)
+
+    return fit
+
+
 @pytest.mark.parametrize(("patience", "kept"), [(1, 1), (0, 3)])
-def test_without_patience_the_autoencoder_runs_every_epoch(
-    patience, kept, healthy, open_study, monkeypatch
-):
-    rising = iter([1.0, 2.0, 3.0])
-    monkeypatch.setattr(
-        autoencoder, "_errors", lambda *_: torch.full((1, 1), next(rising))
-    )
-    settings = dataclasses.replace(open_study[1], epochs=3, patience=patience)
-    assert fit_autoencoder(*healthy, settings=settings, seed=0).best_epoch == kept
+def test_without_patience_the_autoencoder_runs_every_epoch(patience, kept, fit_with):
+    assert fit_with([1.0, 2.0, 3.0], patience)[1] == kept
 
 
-def test_an_autoencoder_that_diverges_at_its_end_is_refused_without_patience(
-    healthy, open_study, monkeypatch
-):
-    errors = iter([1.0, np.nan])
-    monkeypatch.setattr(
-        autoencoder, "_errors", lambda *_: torch.full((1, 1), next(errors))
-    )
-    settings = dataclasses.replace(open_study[1], epochs=2, patience=0)
+def test_an_autoencoder_that_diverges_at_its_end_is_refused_without_patience(fit_with):
     with pytest.raises(SimulationError, match="diverged before its last epoch"):
-        fit_autoencoder(*healthy, settings=settings, seed=0)
+        fit_with([1.0, np.nan], patience=0)
 
 
 def test_the_autoencoder_learns_and_shows_a_moment_that_it_cannot_rebuild(
@@ -349,10 +351,10 @@ def test_the_autoencoder_learns_and_shows_a_moment_that_it_cannot_rebuild(
             *healthy,
             settings=dataclasses.replace(open_study[1], epochs=n, patience=30),
             seed=0,
-        )
+        )[0]
         for n in (1, 30)
     )
-    few, many = (part.model(windows).mean().item() for part in (short, long))
+    few, many = (part(windows).mean().item() for part in (short, long))
 
     assert many < 0.7 * few
 

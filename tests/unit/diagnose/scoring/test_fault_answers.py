@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from judged_tables import cracks_table, found_cracks
 from numpy.random import default_rng
 from runs import metrics_of, train
 from small_studies import two_channels
@@ -19,16 +20,8 @@ from diagnose.report.fault_answers import (
 )
 from diagnose.report.page import ClassReport
 from diagnose.report.text import leaky_card
-from diagnose.scoring.detection_limit import detection
-from diagnose.scoring.judged import Judged
-from diagnose.scoring.machines import Machines
 
 SEVERITY = np.linspace(0.1, 0.9, 200)
-
-
-def scores_apart(score):
-    """Log-probabilities of two classes with a given detection score, (seed, record)."""
-    return np.stack([np.zeros_like(score), score], axis=-1)
 
 
 def detected(is_found, *, n_units=20, sizes=None, threshold=True):
@@ -37,31 +30,16 @@ def detected(is_found, *, n_units=20, sizes=None, threshold=True):
     label = np.repeat([0, 1], [200, n_cracks])
     unit = np.concatenate([np.arange(200), np.arange(n_cracks)]) % n_units
     healthy = default_rng(4).normal(size=200)
-    score = np.concatenate([healthy, np.where(is_found, 50.0, -50.0)])[None]
-    judged = Judged(
-        method="cnn",
-        truth=label,
-        unit=unit,
-        machines=Machines.alone(n_units),
-        answers=scores_apart(score),
-    )
-    healthy_elsewhere = Judged(
-        method="cnn",
-        truth=np.zeros(400, dtype=int),
-        unit=np.arange(400) % 20,
-        machines=Machines.alone(20),
-        answers=scores_apart(default_rng(5).normal(size=(1, 400))),
-    )
+    score = np.concatenate([healthy, np.where(is_found, 50.0, -50.0)])
+    healthy_elsewhere = None
+    if threshold:
+        others = np.arange(400) % 20
+        score_there = default_rng(5).normal(size=400)
+        healthy_elsewhere = cracks_table(score_there, np.zeros(400, dtype=int), others)
     if sizes is None:
         sizes = {"severity": SEVERITY, "crack_depth_mm": 4.0 * SEVERITY}
-    return detection(
-        judged,
-        healthy_elsewhere if threshold else None,
-        class_names=("healthy", "crack"),
-        sizes={"crack": sizes},
-        n_bootstrap=100,
-        rng=default_rng(1),
-    )
+    judged = cracks_table(score, label, unit)
+    return found_cracks(judged, healthy_elsewhere, sizes, n_bootstrap=100)
 
 
 def phrase(result):
