@@ -2,14 +2,16 @@
 
 import gc
 import os
+import pickle
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
-import kept_options
 import pytest
+from hydra._internal.sources_registry import SourcesRegistry
+from hydra.core.plugins import Plugins
 from hypothesis import settings
 from parts import Parts
 
@@ -20,6 +22,7 @@ from gensig.geometry.contact import SIDES
 from gensig.geometry.gear import Gear
 from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
+from gensig.report.realism import Range
 from gensig.systems.pair_machine import GearPairMachine, running_pair
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run
@@ -28,10 +31,28 @@ from gensig.systems.run import Run
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
 
+
+def kept(load_config: Callable[..., Any]) -> Callable[..., Any]:
+    """Method of a source of Hydra's that reads each file once; a caller gets a copy."""
+    read: dict[tuple[str, ...], bytes] = {}
+
+    def load(source: Any, config_path: str) -> Any:
+        key = (source.provider, source.path, config_path)
+        if key not in read:
+            read[key] = pickle.dumps(load_config(source, config_path))
+        return pickle.loads(read[key])
+
+    return load
+
+
 # A cold cache of kernels adds no line to what a command prints; test_progress has a process for it.
 gensig.compilation.on_compilation = lambda *told: nullcontext()
 
-kept_options.keep()
+# Hydra reads a file of a package once a process, and a composition takes half the time: these files
+# do not change while tests run. Files of a user's own folder have another source.
+Plugins.instance()  # registers the sources
+PACKAGED = SourcesRegistry.instance().resolve("pkg")
+PACKAGED.load_config = kept(PACKAGED.load_config)
 
 # The first file compiles the integrator, which takes a minute; those of the networks, which
 # another process begins with, need none of it and find everything compiled afterwards. Then
@@ -141,6 +162,13 @@ def running_of() -> Callable[..., RunningPair]:
         return replace(running, teeth=replace(teeth, errors=errors, tilts=tilts))
 
     return make
+
+
+@pytest.fixture(scope="session")
+def measured() -> Callable[..., Range]:
+    """A measured range of made-up numbers with fields replaced."""
+    texts = {"id": "a.b", "at": "here", "unit": "ms", "source": "rig"}
+    return lambda **changes: Range(**{**texts, "low": 1.0, "high": 2.0, **changes})
 
 
 @pytest.fixture(scope="module")

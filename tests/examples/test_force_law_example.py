@@ -6,6 +6,7 @@ import lane_tools
 import numpy as np
 import pytest
 from force_law_example import Stop, StopLaw
+from refusals import refused
 
 from gensig.dynamics.backends.nystroem.method import FORCE_LAWS
 from gensig.dynamics.decimation import in_band_error
@@ -97,5 +98,5 @@ def test_a_stop_that_is_hit_converges_with_the_step(pair):
 
 def test_an_element_without_a_law_is_refused(pair, monkeypatch):
     monkeypatch.delitem(FORCE_LAWS, Stop.law)
-    with pytest.raises(SimulationError, match="no force law 'stop'; there are: none"):
+    with refused("no force law 'stop'; there are: none", SimulationError):
         motion(with_stop(pair, 0.0))

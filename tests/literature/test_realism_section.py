@@ -1,13 +1,12 @@
 """The results in docs/howto/realism.md: simulated records beside measured ranges."""
 
-from measured_range import measured
 from validation.realism_section import realism_lines
 
 from benchmarks._realism_results import write_results
 from gensig.report.realism import compare
 
 
-def test_section(tmp_path):
+def test_section(measured, tmp_path):
     path = tmp_path / "results.csv"
     assert realism_lines(path) == []
     write_results(

@@ -15,9 +15,16 @@ LINES = {**FEW, DURATION: "0.25", "plan.n_records": "8", "plan.n_units": "4"}
 ENGINES = {
     **FEW,
     DURATION: "0.1",
+    "plan.n_records": "4",
+    "plan.n_units": "2",
+    "plan.n_gearboxes": "2",
+}
+TRAINED_ENGINES = {
+    **ENGINES,
     "plan.n_records": "12",
     "plan.n_units": "3",
     "plan.n_gearboxes": "3",
+    "plan.classes": "[healthy,missing_tooth]",
 }
 LIVES = {
     **FEW,
@@ -26,11 +33,13 @@ LIVES = {
     "plan.n_units": "24",
     "life.snapshot_count": "3",
 }
+FEW_SLICES = {"mesh.n_slices": "8"}
 # experiment -> values of its smallest data set
 SETS: Mapping[str, Values] = {
     "two_stage": LINES,
     "engine_broken_tooth": ENGINES,
-    "engine_test_point": {**ENGINES, "plan.n_records": "24"},
+    "engine_test_point": TRAINED_ENGINES,
+    "helical": {**FEW, **FEW_SLICES},
     "my_records": LINES,
     "reducer2": LINES,
     "run_to_failure": LIVES,
@@ -61,7 +70,7 @@ FLAGS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 }
 # verb -> flags that are added
 ADDED: Mapping[str, tuple[str, ...]] = {
-    "detectability": ("--n-units", "4", "--workers", "1", f"{DURATION}=0.5"),
+    "detectability": ("--n-units", "4", "--workers", "1", f"{DURATION}=0.25"),
     "implant": ("--records", "60"),
     "modify-flank": ("--points", "1"),
     "tune-damper": ("--run", "1600", "1700", "50", "--nodes", "45"),
@@ -93,7 +102,8 @@ def with_values(words: Sequence[str], values: Values) -> list[str]:
 def _least_set(words: Sequence[str]) -> list[str]:
     values = dict(SETS.get(value_of(words, "experiment"), FEW))
     if value_of(words, "life"):
-        values |= {**LIVES, "plan.n_units": "3"}
+        n_classes = value_of(words, "plan.classes").count(",") + 1
+        values |= {**LIVES, "plan.n_units": str(n_classes)}
     if value_of(words, "plan.n_repeats"):
         values["plan.n_records"] = "48"
     if value_of(words, "operating") or value_of(words, "operating.turns"):
@@ -122,16 +132,25 @@ def _least_training(words: Sequence[str]) -> list[str]:
     return with_values(words, values)
 
 
-def _least_course(words: Sequence[str]) -> list[str]:
+def _least_record(words: Sequence[str]) -> list[str]:
     """A record whose speed changes is short, whatever its course lasts."""
+    values = {}
     if value_of(words, "operating"):
-        return with_values(words, {DURATION: "1"})
-    return [*words]
+        values[DURATION] = "1"
+    if value_of(words, "system") == "helical_pair":
+        values |= FEW_SLICES
+    return with_values(words, values)
+
+
+def _least_run_up(words: Sequence[str]) -> list[str]:
+    """A run-up from half the speed: in a second it is slow enough for orders."""
+    slow = {DURATION: "1", "operating.speed_profile.first_factor": "0.5"}
+    return with_values(words, {**slow, **FEW_SLICES})
 
 
 def _least_flank(words: Sequence[str]) -> list[str]:
     independent = {
-        "mesh.n_slices": "8",
+        **FEW_SLICES,
         "mesh.slice_coupling": "independent",
         "mesh.contact": "linear",
     }
@@ -142,7 +161,8 @@ LEAST = {
     "modify-flank": _least_flank,
     "generate": _least_set,
     "plan": _least_plan,
-    "simulate": _least_course,
+    "run-up": _least_run_up,
+    "simulate": _least_record,
     "train": _least_training,
 }
 

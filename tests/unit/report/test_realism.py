@@ -8,7 +8,6 @@ import math
 from dataclasses import replace
 
 import pytest
-from measured_range import measured
 from refusals import refused
 
 from benchmarks._realism_results import read_results, write_results
@@ -40,7 +39,7 @@ def test_verdicts(low, high, p5, p95, verdict):
     assert judge(low, high, p5, p95) == verdict
 
 
-def test_values_that_are_unknown_do_not_count():
+def test_values_that_are_unknown_do_not_count(measured):
     result = compare(measured(), [NAN, 1.0, 1.5, 2.0, NAN])
     assert (result.median, result.n, result.verdict) == (1.5, 3, "inside")
     assert (result.p5, result.p95) == pytest.approx((1.05, 1.95))
@@ -59,14 +58,14 @@ def test_every_published_range_is_read_once_and_makes_sense():
     assert result["missing_tooth.rms_ratio", "all conditions"].low is None
 
 
-def test_a_range_upside_down_and_a_verdict_there_is_not_are_refused():
+def test_a_range_upside_down_and_a_verdict_there_is_not_are_refused(measured):
     with refused("low = 3 lies above high = 2"):
         measured(low=3.0)
     with refused("verdict = 'fine'; allowed: inside"):
         replace(compare(measured(), [1.0]), verdict="fine")
 
 
-def test_results_come_back_and_reasons_stay(tmp_path):
+def test_results_come_back_and_reasons_stay(measured, tmp_path):
     path = tmp_path / "results.csv"
     result = [
         compare(measured(), [1.5, 1.6]),
