@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from diagnose.data.groups import Group, groups_of
 from diagnose.data.windows import FloatArray, IntArray
-from diagnose.scoring.intervals import finite, interval_text, with_interval
+from diagnose.scoring.intervals import interval_text, with_interval
 from diagnose.scoring.judged import Judged, drawn_scores, score
 from diagnose.scoring.machines import CountArray
+from gensig.text.amounts import finite
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset

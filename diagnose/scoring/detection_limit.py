@@ -28,7 +28,6 @@ from diagnose.scoring.detection_curve import (
 )
 from diagnose.scoring.intervals import (
     Interval,
-    finite,
     interval_text,
     is_above,
     share_with_interval,
@@ -37,6 +36,7 @@ from diagnose.scoring.intervals import (
 from diagnose.scoring.judged import Judged
 from diagnose.scoring.machines import CountArray, Support
 from diagnose.scoring.metrics import ratio
+from gensig.text.amounts import finite
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset

@@ -9,6 +9,7 @@ import numpy as np
 
 from diagnose.data.windows import FloatArray
 from diagnose.scoring.machines import MACHINES, Support
+from gensig.text.amounts import finite
 
 Quantile = Literal["linear", "inverted_cdf"]  # of numpy
 Side = Literal["above", "below", "neither"]
@@ -116,11 +117,6 @@ def exact_interval(share: float, n_trials: int) -> tuple[float, float]:
     if misses > 0:
         high = float(beta.ppf(0.975, hits + 1, misses))
     return low, high
-
-
-def finite(value: float) -> float | None:
-    """A number that JSON can hold; None for one that is not finite."""
-    return float(value) if np.isfinite(value) else None
 
 
 def interval_text(scored: Mapping[str, Any], form: str = ".2f") -> str:

@@ -1,8 +1,10 @@
-"""Sizes and durations as people read them."""
+"""Sizes and durations as people read them, numbers as JSON has them."""
+
+import math
 
 import pytest
 
-from gensig.text.amounts import duration_text, size_text
+from gensig.text.amounts import duration_text, finite, size_text
 
 
 @pytest.mark.parametrize(
@@ -34,3 +36,10 @@ def test_a_size_has_three_digits_and_the_largest_unit_that_fits(n_bytes, text):
 )
 def test_a_duration_has_its_two_largest_units(seconds, text):
     assert duration_text(seconds) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"), [(2, 2.0), (-0.5, -0.5), (math.nan, None), (-math.inf, None)]
+)
+def test_json_holds_finite_numbers_alone(value, shown):
+    assert finite(value) == shown
