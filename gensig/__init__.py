@@ -143,7 +143,7 @@ def generate(
     gensig.errors.GensigError    for anything that cannot be used, for a shard that fails, and with
             ``reuse`` for a folder that is another data set
     """
-    from gensig.production.folder import make_folder
+    from gensig.production.making import make_folder
 
     make_folder(
         overrides,

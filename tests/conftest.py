@@ -8,6 +8,7 @@ from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
+import kept_options
 import pytest
 from hypothesis import settings
 from parts import Parts
@@ -29,6 +30,8 @@ settings.load_profile("untimed")
 
 # A cold cache of kernels adds no line to what a command prints; test_progress has a process for it.
 gensig.compilation.on_compilation = lambda *told: nullcontext()
+
+kept_options.keep()
 
 # The first file compiles the integrator, which takes a minute; those of the networks, which
 # another process begins with, need none of it and find everything compiled afterwards. Then

@@ -1,6 +1,7 @@
 """Refusals in one line, and tables of them."""
 
 import re
+from ast import literal_eval
 from collections.abc import Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -21,3 +22,9 @@ def refused(words, error=ConfigError):
 def refusals(table: Mapping[str, Any]) -> pytest.MarkDecorator:
     """One test a row of a table: ``words`` of the message -> what is ``given``."""
     return pytest.mark.parametrize(("words", "given"), table.items(), ids=[*table])
+
+
+def given(words):
+    """What ``key=value`` words give, values as Python writes them."""
+    pairs = (word.split("=") for word in words.split())
+    return {key: literal_eval(value) for key, value in pairs}

@@ -27,12 +27,13 @@ from diagnose.bridge.implanted_windows import (
     NO_RESIDUAL,
     PHYSICS,
     Implanted,
+    healthy_stretches,
     implanted,
     judged_stretches,
     judged_windows,
 )
 from diagnose.bridge.protocol import BridgeProtocol
-from diagnose.bridge.rules import carrying_stretches, handbook_answers
+from diagnose.bridge.rules import handbook_answers
 from gensig.measured.measured_set import LABELS
 
 if TYPE_CHECKING:
@@ -130,7 +131,7 @@ def run_bridge(
             implants = _implants_of(method, own, machine, data, protocol, seed)
             rows.append(network_answers(implants, windows, settings, seed))
         answers[method] = _of_network(np.stack(rows))
-    healthy = carrying_stretches(machine.healthy, first.blocks)
+    healthy = healthy_stretches(machine, first.blocks, carry=True)
     on_step("handbook rule and novelty")
     answers[HANDBOOK] = handbook_answers(healthy, stretches)
     distance, why_not = distance_answers(machine, healthy, stretches)

@@ -174,9 +174,10 @@ def interval_text(interval: tuple[float, float] | None, *, sign: str = "") -> st
 
 def ranked_rows(result: BridgeResult) -> list[tuple[str, ...]]:
     """A row a method: name, balanced accuracy, both intervals, healthy against faulty."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for method in result.answers:
-        score, cells = result.accuracy(method), ("names no class", "", "")
+        score = result.accuracy(method)
+        cells: tuple[str, ...] = ("names no class", "", "")
         if score is not None:
             ends = (score.by_recording, score.by_specimen)
             cells = (f"{score.mean:.2f}", *map(interval_text, ends))

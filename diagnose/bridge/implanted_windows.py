@@ -159,6 +159,19 @@ def _window_set(
     )
 
 
+def healthy_stretches(
+    machine: BridgeMachine, blocks: Sequence[Block], *, carry: bool
+) -> list[Stretch]:
+    """Stretches of the healthy recordings that carry, to learn from, or that were held out."""
+    stretches = []
+    for number, sample in enumerate(machine.healthy):
+        own = [one for one in blocks if (one.recording, one.carries) == (number, carry)]
+        if own:
+            start, stop = min(one.start for one in own), max(one.stop for one in own)
+            stretches.append(Stretch(sample=sample, start=start, stop=stop))
+    return stretches
+
+
 def judged_stretches(machine: BridgeMachine, blocks: Sequence[Block]) -> list[Stretch]:
     """Stretches that are judged: what was held out of healthy recordings, and all faulty ones.
 
@@ -166,15 +179,7 @@ def judged_stretches(machine: BridgeMachine, blocks: Sequence[Block]) -> list[St
     ------
     DatasetError    for a stretch that carried
     """
-    stretches = []
-    for number, sample in enumerate(machine.healthy):
-        free = [
-            block for block in blocks if block.recording == number and not block.carries
-        ]
-        if free:
-            start = min(block.start for block in free)
-            stop = max(block.stop for block in free)
-            stretches.append(Stretch(sample=sample, start=start, stop=stop))
+    stretches = healthy_stretches(machine, blocks, carry=False)
     for sample in machine.faulty:
         length = sample.signal.acceleration.shape[1]
         stretches.append(Stretch(sample=sample, start=0, stop=length))

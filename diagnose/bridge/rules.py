@@ -10,22 +10,8 @@ from diagnose.bridge.bridge_machine import Sample
 from diagnose.bridge.bridge_scores import Answers
 from diagnose.bridge.implanted_windows import Stretch
 from diagnose.data.windows import FloatArray
-from gensig.implants.blocks import Block
 from gensig.measured.measured_set import LABELS
 from gensig.signals.handbook_rule import handbook_answer
-
-
-def carrying_stretches(
-    samples: Sequence[Sample], blocks: Sequence[Block]
-) -> list[Stretch]:
-    """Stretches of the healthy recordings that carry: what a method may learn from."""
-    stretches = []
-    for number, sample in enumerate(samples):
-        own = [block for block in blocks if block.recording == number and block.carries]
-        if own:
-            stop = max(block.stop for block in own)
-            stretches.append(Stretch(sample=sample, start=0, stop=stop))
-    return stretches
 
 
 def handbook_answers(healthy: Sequence[Stretch], judged: Sequence[Stretch]) -> Answers:

@@ -199,7 +199,7 @@ class Turns(NetworkInput):
         rate = task.dataset.sampling_rate
         speed_rpm, teeth = _speed_rpm(task).tolist(), teeth_of_records(task.dataset)
         sound_turns = self._sound_turns(task, read)
-        gathered = _Gathered()
+        gathered = _Gathered(inputs=self, sampling_rate=rate)
         for row in segments.rows():
             record, start, _ = row
             signal = read(task, *row)
@@ -216,10 +216,7 @@ class Turns(NetworkInput):
                     continue  # half a stretch may be too short
                 passages = (start + first) * passages_per_sample
                 compared = [Steady(of_part, speed / 60 * n_teeth[0])]
-                for turns, sound in self.inputs_of(
-                    [*compared, *sound_turns(record)], rate
-                ):
-                    gathered.add(self, turns, sound, record, passages)
+                gathered.add([*compared, *sound_turns(record)], record, passages)
         if training and self.redraws:
             self._add_redraws(task, segments, gathered)
         record_of, passage = np.array(gathered.record), np.array(gathered.passages)
@@ -272,9 +269,8 @@ class Turns(NetworkInput):
             ]
         except ValueError as error:
             raise ConfigError(f"{file}: {error}") from None
-        gathered = _Gathered()
-        for turns, sound in self.inputs_of(compared, rate):
-            gathered.add(self, turns, sound, 0, 0.0)
+        gathered = _Gathered(inputs=self, sampling_rate=rate)
+        gathered.add(compared, 0, 0.0)
         nothing = np.zeros(len(gathered.record), dtype=np.int64)
         return gathered.windows(nothing, recording.normalise)
 
@@ -432,32 +428,27 @@ class Turns(NetworkInput):
                     Steady(self.prepared(turns), frequency)
                     for turns, frequency in drawn
                 ]
-                for turns, healthy in self.inputs_of(compared, redrawn.sampling_rate):
-                    gathered.add(self, turns, healthy, record, 0.0)
+                gathered.add(compared, record, 0.0)
 
 
 @dataclass(slots=True, kw_only=True)
 class _Gathered:
     """Inputs that are gathered one by one, with their records and the passages before them."""
 
+    inputs: Turns
+    sampling_rate: float
     signals: list[NDArray[np.float32]] = field(default_factory=list)
     levels: list[NDArray[np.float32]] = field(default_factory=list)
     record: list[int] = field(default_factory=list)
     passages: list[float] = field(default_factory=list)
 
-    def add(
-        self,
-        inputs: Turns,
-        turns: GearTurns,
-        sound: Sequence[GearTurns],
-        record: int,
-        passages: float,
-    ) -> None:
-        """Take one input in."""
-        self.signals.append(inputs.packed(turns, sound))
-        self.levels.append(inputs.levels(turns))
-        self.record.append(record)
-        self.passages.append(passages)
+    def add(self, compared: Sequence[Steady], record: int, passages: float) -> None:
+        """Take in all inputs of a recording and of the healthy ones of its machine."""
+        for turns, sound in self.inputs.inputs_of(compared, self.sampling_rate):
+            self.signals.append(self.inputs.packed(turns, sound))
+            self.levels.append(self.inputs.levels(turns))
+            self.record.append(record)
+            self.passages.append(passages)
 
     def windows(self, label: NDArray[Any], normalise: str) -> WindowSet:
         """All inputs as windows that fill their signals."""

@@ -10,7 +10,7 @@ from diagnose.report.methods import (
     oracle_labels,
 )
 from diagnose.report.text import score_cell
-from diagnose.scoring.intervals import interval_text, is_above, too_few_text
+from diagnose.scoring.intervals import interval_text, is_above, side_of, too_few_text
 from diagnose.studies.result_files import Content
 from gensig.text.page import Section, Table
 
@@ -22,13 +22,12 @@ NO_TWINS = (
 def verdict(method: Content, chance: float) -> str:
     """Verdict on a control that must be at chance."""
     score = method["balanced_accuracy"]
-    if score["low"] is None:
-        return f"no verdict: {too_few_text(score)}"
-    if score["low"] > chance:
-        return "ABOVE chance: look for a leak"
-    if score["high"] < chance:
-        return "below chance: one interval in forty is, by luck"
-    return "at chance"
+    return {
+        None: f"no verdict: {too_few_text(score)}",
+        "above": "ABOVE chance: look for a leak",
+        "below": "below chance: one interval in forty is, by luck",
+        "neither": "at chance",
+    }[side_of(score, chance)]
 
 
 def controls_section(metrics: Content) -> Section:

@@ -7,6 +7,7 @@ from typing import Any
 
 from diagnose.data.protocols import MEANING
 from diagnose.report.headlines import headline_protocol, headlines
+from diagnose.report.text import shown
 from diagnose.scoring.alarms import FALSE_ALARMS
 from diagnose.scoring.detection_limit import too_few_for_curve
 from diagnose.scoring.intervals import interval_text, is_above, too_few_text
@@ -62,7 +63,7 @@ def fault_section(metrics: Content) -> Section:
     notes = [("", line) for line in headlines(metrics)]
     detection = _detection(metrics)
     if detection is None:
-        rows = [(name, f"{share:.2f}") for name, share in recall.items()]
+        rows = [(name, shown(share)) for name, share in recall.items()]
         text = [
             f"Network {metrics['model']}, {protocol}: share of the test records of each class "
             "that is named right. Without healthy test records no alarm can be judged."
@@ -76,7 +77,7 @@ def fault_section(metrics: Content) -> Section:
             answers[name],
             interval_text(part["share_found"]),
             f"{part['n_records']} of {part['n_units']} machines",
-            _share(recall.get(name)),
+            shown(recall.get(name)),
         )
         for name, part in detection["classes"].items()
     ]
@@ -228,9 +229,3 @@ def _ends(row: Mapping[str, Any]) -> str:
     if row["high"] is None:
         ends[1] = f"over {row['largest_tested']:.2g}"
     return f"{text} [{ends[0]}, {ends[1]}]"
-
-
-def _share(value: float | None) -> str:
-    if value is None:
-        return "-"
-    return f"{value:.2f}"

@@ -15,6 +15,7 @@ from diagnose.report.base import Report
 from diagnose.report.panels import COLORS, panels, save, spaced
 from diagnose.report.text import (
     FEW_UNITS,
+    TOLD,
     card_spread,
     data_line,
     few_groups,
@@ -24,7 +25,7 @@ from diagnose.report.text import (
     level_text,
     made_by,
 )
-from diagnose.scoring.intervals import drawn_text, interval_text, too_few_text
+from diagnose.scoring.intervals import drawn_text, interval_text, side_of, too_few_text
 from diagnose.scoring.life_scores import BAND, MEASURES
 from diagnose.scoring.predictions import Prediction, hours_of
 from diagnose.studies.life_jobs import AGE_ONLY, AND_AGE, CONSTANT
@@ -203,13 +204,9 @@ def _card(name: str, result: Content, model: str) -> Card:
     methods = result["methods"]
     network, by_age = methods[model], methods[AGE_ONLY]["rmse_h"]["mean"]
     score, better = network["rmse_h"], network["gain_over_age_only_h"]
-    found, mark = "not told from", "bad"
-    if better["low"] is None:
-        found = f"{too_few_text(better)} to compare it with"
-    elif better["low"] > 0:
-        found, mark = "better than", "good"
-    elif better["high"] < 0:
-        found = "worse than"
+    side = side_of(better)
+    found = TOLD.get(side, f"{too_few_text(better)} to compare it with")
+    mark = "good" if side == "above" else "bad"
     meaning = MEANING.get(name, "tested on machines never seen")
     return Card(
         title=name,

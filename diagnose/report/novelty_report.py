@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from diagnose.scoring.alarms import FALSE_ALARMS, LEAST_HEALTHY
+from diagnose.report.text import shown
+from diagnose.scoring.alarms import FALSE_ALARMS
 from diagnose.scoring.intervals import drawn_text, interval_text
 from diagnose.studies.novelty import SCORE_LABELS
 from diagnose.studies.novelty_metrics import TRUE_POSITIVES
@@ -47,25 +48,6 @@ def novelty_sections(novelty: Content) -> list[Section]:
         )
         for name, result in novelty.items()
     ]
-
-
-def novelty_caveats(novelty: Content, few_units: int) -> list[str]:
-    """Weaknesses of the numbers, one line each."""
-    lines = []
-    for name, result in novelty.items():
-        kind, n_groups = min(result["resampled"].items(), key=lambda item: item[1])
-        if n_groups < few_units:
-            lines.append(
-                f"{name}: only {n_groups} {kind} in the test part; at least {few_units} are "
-                "advisable."
-            )
-        if (n_records := result["n_records"]["validation"]) < LEAST_HEALTHY:
-            lines.append(
-                f"{name}: {n_records} validation record(s); with fewer than {LEAST_HEALTHY} no "
-                f"threshold promises {FALSE_ALARMS:.0%} of false alarms, "
-                "the largest score is taken."
-            )
-    return lines
 
 
 def _parts_sentence(result: Content) -> str:
@@ -114,12 +96,6 @@ def _table(result: Content) -> Table:
     for name, method in result["methods"].items():
         scores = [method.get(key) for key in keys]
         scores += [method["found"][label] for label in novel]
-        rows.append([SCORE_LABELS[name], *map(_cell, scores)])
+        rows.append([SCORE_LABELS[name], *map(shown, scores)])
     head = [*(HEADS[key] for key in keys), *(f"{name} found" for name in novel)]
     return Table(head=["score", *head], rows=rows)
-
-
-def _cell(score: Content | None) -> str:
-    if score is None:
-        return "-"
-    return interval_text(score)

@@ -8,8 +8,15 @@ import numpy as np
 
 from diagnose.data.protocols import left_out_lines
 from diagnose.report.methods import controls_on_cards, rivals_on_cards
-from diagnose.report.novelty_report import novelty_caveats
-from diagnose.scoring.intervals import drawn_text, interval_text, is_above, too_few_text
+from diagnose.scoring.alarms import FALSE_ALARMS, LEAST_HEALTHY
+from diagnose.scoring.intervals import (
+    Side,
+    drawn_text,
+    interval_text,
+    is_above,
+    side_of,
+    too_few_text,
+)
 from diagnose.scoring.machines import LEAST_UNITS, MACHINES, Support
 from diagnose.studies.result_files import Content
 from diagnose.studies.verdicts import failed_controls
@@ -18,6 +25,11 @@ from gensig.text.page import Card, Section, Table
 FEW_UNITS = 10
 WITHHELD = "withheld: a control failed"
 CONFUSED = 0.1
+TOLD: dict[Side | None, str] = {
+    "above": "better than",
+    "below": "worse than",
+    "neither": "not told from",
+}
 TRUST_HEAD = (
     "protocol",
     "calibration error before, after (chance)",
@@ -29,14 +41,18 @@ TRUST_HEAD = (
 )
 
 
-def score_cell(method: Content | None) -> str:
-    """Balanced accuracy with its interval, "-" for a method that was not run."""
-    if method is None:
+def shown(score: Content | float | None) -> str:
+    """A score with its interval where it has one; "-" for one that was not taken."""
+    if score is None:
         return "-"
-    value = method["balanced_accuracy"]
-    if isinstance(value, float):
-        return f"{value:.2f}"
-    return interval_text(value)
+    if isinstance(score, int | float):
+        return f"{score:.2f}"
+    return interval_text(score)
+
+
+def score_cell(method: Content | None) -> str:
+    """Balanced accuracy of a method; "-" for one that was not run."""
+    return shown(method and method["balanced_accuracy"])
 
 
 def shown_score(result: Content, method: str) -> str:
@@ -128,27 +144,25 @@ def leaky_card(name: str, metrics: Content) -> Card:
 
 def _leak_words(difference: Content, against: str) -> str:
     """Meaning of the difference between a leaky and a clean protocol."""
-    if difference["low"] is None:
-        return "The difference has no interval, so that nothing can be said of it."
     mean = abs(difference["mean"])
-    if difference["low"] > 0:
-        return f"In this study it shows {mean:.2f} more than {against}."
-    if difference["high"] < 0:
-        return f"In this study it shows {mean:.2f} less than {against}."
-    return f"In this study it is not told from {against}."
+    return {
+        None: "The difference has no interval, so that nothing can be said of it.",
+        "above": f"In this study it shows {mean:.2f} more than {against}.",
+        "below": f"In this study it shows {mean:.2f} less than {against}.",
+        "neither": f"In this study it is not told from {against}.",
+    }[side_of(difference)]
 
 
 def _verdict(result: Content, score: Content, chance: float) -> tuple[list[str], bool]:
     """Verdicts on a score, and True if a control is above chance."""
     methods = result["methods"]
-    if score["low"] is None:
-        reason = too_few_text(score)
-        lines = [f"no verdict against chance ({chance:.2f}): {reason}"]
-    elif is_above(score, chance):
-        lines = [f"above chance ({chance:.2f})"]
-    else:
-        lines = [f"not distinguishable from chance ({chance:.2f})"]
-    if score["low"] is not None:
+    side = side_of(score, chance)
+    found = {
+        None: f"no verdict against chance ({chance:.2f}): {too_few_text(score)}",
+        "above": f"above chance ({chance:.2f})",
+    }.get(side, f"not distinguishable from chance ({chance:.2f})")
+    lines = [found]
+    if side is not None:
         lines += _best_rival(result, score)
     if "oracle" in methods:
         share = result["over_oracle"]["balanced_accuracy"]
@@ -181,12 +195,7 @@ def _best_rival(result: Content, score: Content) -> list[str]:
     label = rivals_on_cards().get(best, best)
     mean = result["methods"][best]["balanced_accuracy"]["mean"]
     # an interval that holds the other's mean tells the two apart neither way
-    comparison = "not told from"
-    if score["low"] > mean:
-        comparison = "better than"
-    elif score["high"] < mean:
-        comparison = "worse than"
-    return [f"{comparison} {label} ({mean:.2f})"]
+    return [f"{TOLD[side_of(score, mean)]} {label} ({mean:.2f})"]
 
 
 def card_spread(score: Content, form: str = ".2f") -> str:
@@ -201,8 +210,7 @@ def recall_table(clean: Content, model: str, class_names: Sequence[str]) -> Tabl
     rows = []
     for protocol, result in clean.items():
         recall = result["methods"][model]["recall"]
-        cells = {name: f"{share:.2f}" for name, share in recall.items()}
-        rows.append([protocol, *(cells.get(name, "-") for name in class_names)])
+        rows.append([protocol, *(shown(recall.get(name)) for name in class_names)])
     return Table(head=["protocol", *class_names], rows=rows)
 
 
@@ -306,7 +314,7 @@ def caveats(metrics: Content) -> list[str]:
                 f"{name}: only {n_groups} {kind} in the test part. The interval shows the spread "
                 f"of these and is too narrow for new ones; at least {FEW_UNITS} are advisable."
             )
-    lines += novelty_caveats(metrics["novelty"], FEW_UNITS)
+    lines += novelty_caveats(metrics["novelty"])
     if metrics["settings"]["normalise"] == "rms":
         lines.append(
             "The network sees windows without their level, the indicators with it unless stated; "
@@ -317,4 +325,23 @@ def caveats(metrics: Content) -> list[str]:
         lines.append(f"The baseline {name} is left out of {reason}.")
     if n_failed := metrics["n_records_unusable"]:
         lines.append(f"{n_failed} record(s) failed in simulation and are left out.")
+    return lines
+
+
+def novelty_caveats(novelty: Content) -> list[str]:
+    """Weaknesses of the scores of novelty, one line each."""
+    lines = []
+    for name, result in novelty.items():
+        support = fewest(result)
+        if support.n_groups < FEW_UNITS:
+            lines.append(
+                f"{name}: only {support.n_groups} {support.kind} in the test part; at least "
+                f"{FEW_UNITS} are advisable."
+            )
+        if (n_records := result["n_records"]["validation"]) < LEAST_HEALTHY:
+            lines.append(
+                f"{name}: {n_records} validation record(s); with fewer than {LEAST_HEALTHY} no "
+                f"threshold promises {FALSE_ALARMS:.0%} of false alarms, "
+                "the largest score is taken."
+            )
     return lines

@@ -11,6 +11,7 @@ from diagnose.data.windows import FloatArray
 from diagnose.scoring.machines import MACHINES, Support
 
 Quantile = Literal["linear", "inverted_cdf"]  # of numpy
+Side = Literal["above", "below", "neither"]
 
 
 class Interval(TypedDict):
@@ -153,6 +154,16 @@ def spread_text(
     return f"95 % interval over {drawn_text(resampled)} {low:{form}} to {high:{form}}"
 
 
+def side_of(score: Mapping[str, Any], level: float = 0.0) -> Side | None:
+    """Side of a level on which a whole interval lies; None without an interval."""
+    low, high = score["low"], score["high"]
+    if low is None or high is None:
+        return None
+    if low > level:
+        return "above"
+    return "below" if high < level else "neither"
+
+
 def is_above(score: Mapping[str, Any], level: float) -> bool:
     """True if a whole interval lies above a level; False without an interval."""
-    return score["low"] is not None and bool(score["low"] > level)
+    return side_of(score, level) == "above"

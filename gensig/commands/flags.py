@@ -88,6 +88,11 @@ def switch(*names: str, help: str) -> Argument:
     return Argument(names, {"action": "store_true", "help": help})
 
 
+def choice(name: str, choices: tuple[str, ...], help: str, **options: Any) -> Argument:
+    """An argument that takes one of some words."""
+    return Argument((name,), {"choices": choices, "help": help, **options})
+
+
 def overrides(help: str) -> Argument:
     """The words of the form group=option and key=value."""
     return text("overrides", "OVERRIDES", help, nargs="*")
@@ -122,6 +127,19 @@ WORKERS = Argument(
     },
 )
 QUIET = switch("--quiet", help="print nothing but mistakes")
+
+
+CHANNELS = text("--channels", "NAME", "columns to use (default: all)", nargs="+")
+ARRAY = text(
+    "--array", "NAME", "array of a .npz, .h5 or .mat file (default: acceleration)"
+)
+UNIT = Argument(
+    ("--unit",),
+    {
+        "default": "m/s2",
+        "help": "m/s2 or g, where the column does not say (default: m/s2)",
+    },
+)
 
 
 def json_file(help: str) -> Argument:

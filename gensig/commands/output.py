@@ -10,7 +10,7 @@ import functools
 import json
 import math
 from argparse import Namespace
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -94,42 +94,38 @@ class Answer:
 
 
 Question: TypeAlias = Callable[[Configuration, Namespace], Answer | int]
+Verb: TypeAlias = Callable[[Namespace], int]
 
 
-def answered(
-    question: Question | None = None, *, group: str | None = None
-) -> Callable[..., Any]:
+def answered(group: str | None = None) -> Callable[[Question], Verb]:
     """The verb that writes and prints the answer to a question on a configuration.
 
     Names of files are checked before anything is computed. A question without an answer gives an
     exit status. ``group`` is that of the option of ``--out``.
     """
-    if question is None:
-        return functools.partial(answered, group=group)
+    return lambda question: functools.partial(_answer, question, group)
 
-    @functools.wraps(question)
-    def verb(arguments: Namespace) -> int:
-        check_file("--json", arguments.json)
-        check_file("--plot", arguments.plot, FIGURE_TYPES)
-        target = None
-        if group is not None and arguments.out is not None:
-            target = option_file(arguments.out, group, force=arguments.force)
-        answer = question(read_configuration(arguments), arguments)
-        if isinstance(answer, int):
-            return answer
-        if arguments.json is not None:
-            text = json.dumps(plain(answer.content), indent=1, allow_nan=False)
-            with replaced_file(arguments.json) as path:
-                path.write_text(text + "\n", encoding="utf-8")
-        if arguments.plot is not None:
-            with replaced_file(arguments.plot) as path:
-                draw(answer.figure(), path)
-        show(*answer.lines)
-        if target is not None and answer.option is not None:
-            write_option(target, answer.option())
-        return 0
 
-    return verb
+def _answer(question: Question, group: str | None, arguments: Namespace) -> int:
+    check_file("--json", arguments.json)
+    check_file("--plot", arguments.plot, FIGURE_TYPES)
+    target = None
+    if group is not None and arguments.out is not None:
+        target = option_file(arguments.out, group, force=arguments.force)
+    answer = question(read_configuration(arguments), arguments)
+    if isinstance(answer, int):
+        return answer
+    if arguments.json is not None:
+        text = json.dumps(plain(answer.content), indent=1, allow_nan=False)
+        with replaced_file(arguments.json) as path:
+            path.write_text(text + "\n", encoding="utf-8")
+    if arguments.plot is not None:
+        with replaced_file(arguments.plot) as path:
+            draw(answer.figure(), path)
+    show(*answer.lines)
+    if target is not None and answer.option is not None:
+        write_option(target, answer.option())
+    return 0
 
 
 def plain(value: Any) -> Any:
@@ -143,6 +139,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+def columns(content: Mapping[str, Any], *keys: str) -> Iterator[tuple[Any, ...]]:
+    """Rows of the columns of some keys."""
+    return zip(*(content[key] for key in keys), strict=True)
 
 
 def span(values: NDArray[np.float64], form: str) -> str:

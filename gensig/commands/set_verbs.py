@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from gensig.commands.flags import (
+    ARRAY,
+    CHANNELS,
     CONFIG_DIR,
     CONFIGURATION,
     FOLDER,
@@ -10,9 +12,11 @@ from gensig.commands.flags import (
     OUT,
     QUIET,
     STORED,
+    UNIT,
     WORKERS,
     Argument,
     Verb,
+    choice,
     count,
     counts,
     number,
@@ -30,7 +34,7 @@ INCOMPLETE = (
 ENDS = ("LOW", "HIGH")
 
 NEW_GEARBOX = (
-    Argument(("what",), {"choices": ("gearbox",), "help": "what to make"}),
+    choice("what", ("gearbox",), "what to make"),
     text("name", "NAME", "of the options that are written"),
     counts(
         "--teeth",
@@ -55,14 +59,12 @@ NEW_GEARBOX = (
         "N_PER_M",
         "radial stiffness of what holds each gear (default: of ball bearings and shafts)",
     ),
-    Argument(
-        ("--experiment",),
-        {
-            "choices": ("plain", "realistic"),
-            "default": "plain",
-            "help": "what the plan is made on: clean signals at the bearings, "
-            "or as measured (default: plain)",
-        },
+    choice(
+        "--experiment",
+        ("plain", "realistic"),
+        "what the plan is made on: clean signals at the bearings, "
+        "or as measured (default: plain)",
+        default="plain",
     ),
     number("--rate", "HZ", "samples a second (default: 51200)"),
     number("--duration", "S", "of a record (default: at least 10 turns)"),
@@ -101,17 +103,9 @@ TWIN = (
     number("--speed", "RPM", "of the driving gear, within 3 %%", required=True),
     required_out("DIR", "folder for the options; its name becomes theirs"),
     number("--rate", "HZ", "samples a second, where the file does not tell"),
-    Argument(
-        ("--unit",),
-        {
-            "default": "m/s2",
-            "help": "m/s2 or g, where the column does not say (default: m/s2)",
-        },
-    ),
-    text("--channels", "NAME", "columns to use (default: all)", nargs="+"),
-    text(
-        "--array", "NAME", "array of a .npz, .h5 or .mat file (default: acceleration)"
-    ),
+    UNIT,
+    CHANNELS,
+    ARRAY,
     number("--module", "MM", "normal module (default: 2, assumed)"),
     number("--torque", "NM", "of the driving gear (default: assumed by size)"),
     text("--check", "FILE", "healthy recording held out (default: the second half)"),
@@ -134,17 +128,9 @@ IMPLANT = (
         "needed; of the driving shaft, within 3 %%; one, or one a recording",
     ),
     number("--sampling-rate", "HZ", "of the files, where they do not tell"),
-    text("--channels", "NAME", "columns to use (default: all)", nargs="+"),
-    Argument(
-        ("--unit",),
-        {
-            "default": "m/s2",
-            "help": "m/s2 or g, where the column does not say (default: m/s2)",
-        },
-    ),
-    text(
-        "--array", "NAME", "array of a .npz, .h5 or .mat file (default: acceleration)"
-    ),
+    CHANNELS,
+    UNIT,
+    ARRAY,
     text(
         "--tacho",
         "NAME",
@@ -156,22 +142,18 @@ IMPLANT = (
         ("LOW", "HIGH"),
         "level of a residual over its carrier, uniform (default: -10 10)",
     ),
-    Argument(
-        ("--path",),
-        {
-            "choices": ("twin", "none"),
-            "default": "twin",
-            "help": "response from the simulated sensor: fitted as by gensig twin, or left out "
-            "(default: twin)",
-        },
+    choice(
+        "--path",
+        ("twin", "none"),
+        "response from the simulated sensor: fitted as by gensig twin, or left out "
+        "(default: twin)",
+        default="twin",
     ),
-    Argument(
-        ("--residual",),
-        {
-            "choices": ("physics", "noise_bursts", "shuffled_phases", "none"),
-            "default": "physics",
-            "help": "what is implanted: physics, or a control (default: physics)",
-        },
+    choice(
+        "--residual",
+        ("physics", "noise_bursts", "shuffled_phases", "none"),
+        "what is implanted: physics, or a control (default: physics)",
+        default="physics",
     ),
     count("--records", "N", "of the set (default: 600)", default=600),
     number("--duration", "S", "of a record (default: by the length of the recordings)"),
@@ -251,7 +233,7 @@ SET_VERBS = {
                 "--show-config",
                 help="print the configuration as YAML, and nothing else",
             ),
-            Argument(("--cfg",), {"choices": ("job",), "help": "as --show-config"}),
+            choice("--cfg", ("job",), "as --show-config"),
         ),
     ),
     "new": Verb(
@@ -418,13 +400,7 @@ OTHER_VERBS = {
         ),
         runs="gensig.terminal.completion:completion",
         arguments=(
-            Argument(
-                ("shell",),
-                {
-                    "choices": ("bash", "zsh", "fish"),
-                    "help": "the shell that reads it",
-                },
-            ),
+            choice("shell", ("bash", "zsh", "fish"), "the shell that reads it"),
         ),
     ),
     "validate": Verb(

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.line_gears import gear_dof
 from gensig.driveline.running import RunningLine
@@ -19,7 +19,6 @@ from gensig.sensing.toothed_wheel import ToothedWheel, instantaneous_speed
 from gensig.systems.run import Run
 from gensig.units import SPEED
 
-Array = NDArray[np.float64]
 Channel = tuple[str, int]
 
 

@@ -246,7 +246,7 @@ def drive_line_of_pair(system: GearPairMachine, name: str) -> DriveLine:
     Without the soft drive.
     The mesh is held at the mean stiffness of healthy teeth under the set torque.
     """
-    running = running_pair(Run(system=system, faults=()))
+    running = running_pair(Run(system=system))
     pair = system.pair
     bodies, rotors = (running.pinion, running.wheel), (system.motor, system.load)
     sides = tuple(zip(SIDES, pair.gears.values(), bodies, rotors, strict=True))

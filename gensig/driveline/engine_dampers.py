@@ -10,8 +10,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.cycle import CYCLE
 from gensig.driveline.linear.damper_tuning import NodeResponse, response_at_nodes
@@ -30,8 +30,6 @@ from gensig.sensing.manufacturing import Quality
 from gensig.systems.registry import PairParts
 from gensig.systems.root_strength import GearStress, RootHistory, RootStrength
 from gensig.systems.sliced_pair import SlicedPair
-
-Array = NDArray[np.float64]
 
 CYCLE_POINTS = 5760  # over which forces are looked at
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.drive_line import DriveLine, read_drive_line
 from gensig.driveline.excitation.cycle import CYCLE
 from gensig.driveline.excitation.engine import check_group, read_engine, read_wheels
@@ -34,8 +34,6 @@ from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
 from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed
 from gensig.systems.registry import LINE
-
-Array = NDArray[np.float64]
 
 SAMPLES_PER_CYCLE = 7200  # about 100 kHz at 1688 r/min
 SEEN_CYCLES = 6

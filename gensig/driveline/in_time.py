@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.running import (
     Governor,
@@ -21,8 +21,6 @@ from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.mesh.options import refuse_papers_heat
 from gensig.options.configuration import Configuration
 from gensig.systems.registry import PairParts
-
-Array = NDArray[np.float64]
 
 RATE = 10240.0  # Hz, of the signals: flat to 4 kHz
 SETTLING = 0.5  # s

@@ -8,11 +8,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.geometry.contact import GearPair
-
-Array = NDArray[np.float64]
 
 SECONDS = 0.5  # of steady running that stand for a set-point
 SHARED = 0.5  # of the mesh force on one tooth where two pairs carry; assumed

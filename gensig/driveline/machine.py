@@ -13,8 +13,8 @@ from functools import cached_property
 from typing import Self, final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline import loads
 from gensig.driveline.channels import channel, channel_rows, line_signals
 from gensig.driveline.engine_line import EngineLine
@@ -87,8 +87,6 @@ from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.stiffness_curves import StiffnessCurves, stiffness_curves
 from gensig.systems.supports import supports_in_gearbox
 from gensig.units import SPEED
-
-Array = NDArray[np.float64]
 
 MOST_ENERGY_RESIDUAL = 1e-3
 
@@ -358,7 +356,7 @@ class LineMachine(Machine):
         machine = replace(
             self, operating=replace(self.operating, speed=speed, torque=torque)
         )
-        line = machine.line(Run(system=machine, faults=()))
+        line = machine.line(Run(system=machine))
         force = "mesh_force", machine.mesh_number
         motion, angle = line_motion(machine, line, loads.SECONDS, [force])
         return angle, motion.signals[force]

@@ -6,8 +6,8 @@ import warnings
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.engine_line import EngineLine
 from gensig.dynamics.backends.registry import EXPLICIT_BACKEND, IMPLICIT_BACKEND
 from gensig.dynamics.integrator import Solver
@@ -17,8 +17,6 @@ from gensig.geometry.contact import SIDES
 from gensig.mesh.options import MeshOptions
 from gensig.mesh.tooth_table import ToothTable
 from gensig.systems.base import Machine
-
-Array = NDArray[np.float64]
 
 LINE_BACKENDS = (EXPLICIT_BACKEND, IMPLICIT_BACKEND)
 

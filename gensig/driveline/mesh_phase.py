@@ -10,15 +10,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.drive_line import DriveLine
 from gensig.driveline.linear.shaft_line import GearMesh
 from gensig.errors import GeometryError
 from gensig.geometry.contact import GearPair
 from gensig.systems.run import Start
-
-Array = NDArray[np.float64]
 
 
 def tooth_angles(line: DriveLine, turned: float = 0.0) -> Array:

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.cycle import CYCLE
 from gensig.driveline.linear.forced import closed_line, steady_response
@@ -45,8 +45,6 @@ from gensig.errors import ConfigError, StepError
 from gensig.geometry.contact import GearPair
 from gensig.mesh.even_table import even_table
 from gensig.operation.setpoint import Operating
-
-Array = NDArray[np.float64]
 
 LEAST_APPROACH = 2e-6  # m, at which a mesh that carries next to nothing is taken
 TABLE_STEP = 100.0 * math.pi / 30.0  # rad/s of the crank between tables of a run-up

@@ -12,8 +12,8 @@ from functools import partial
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.cycle import CYCLE
 from gensig.driveline.excitation.cycle_statistics import (
@@ -32,8 +32,6 @@ from gensig.driveline.running import EngineCourse, running_line
 from gensig.driveline.time.newmark import LineMotion
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.errors import ConfigError
-
-Array = NDArray[np.float64]
 
 KNOT = 0.02  # s between the knots of the course
 MOST_BINS = 44  # of speed: 25 r/min over 650 to 1750 r/min

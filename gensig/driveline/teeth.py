@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.drive_line import DriveLine
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.line_gears import gear_names, line_gears, line_meshes
@@ -47,8 +47,6 @@ from gensig.sensing.manufacturing import GearErrors, Specimen
 from gensig.systems.base import home_meshes
 from gensig.systems.run import Start
 from gensig.systems.sliced_pair import SlicedPair
-
-Array = NDArray[np.float64]
 
 # most of a pitch of sound helical teeth: short tables are read faster, and these ripple slowly
 SOUND_NODES = 128

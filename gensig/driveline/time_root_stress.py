@@ -8,8 +8,8 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.engine_dampers import (
     DynamicRootStress,
     crank_of_passes,
@@ -21,8 +21,6 @@ from gensig.driveline.excitation.cycle_statistics import typical_extremes, whole
 from gensig.driveline.in_time import TimeResponse
 from gensig.errors import ConfigError
 from gensig.systems.root_strength import RootStrength
-
-Array = NDArray[np.float64]
 
 
 def root_stress_in_time(

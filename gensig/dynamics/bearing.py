@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError, SimulationError
 from gensig.material import Material
 from gensig.units import from_si, unit
-
-Array = NDArray[np.float64]
 
 CAGE_POSITIONS = (
     64  # over half of the angle between two balls, the other half mirrors it

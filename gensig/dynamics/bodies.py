@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import SimulationError
-
-Array = NDArray[np.float64]
 
 HOUSING = -1  # end of a spring that stands still
 

@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics._record_kernels import TOGETHER, low_pass
 from gensig.dynamics._vector import LANES
-
-Array = NDArray[np.float64]
 
 # of the output rate: the pass band ends at 20 kHz of 51.2 kHz, the stop band begins
 PASS_SHARE, STOP_SHARE = 0.390625, 0.5

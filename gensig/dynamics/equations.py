@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Complex, Integers
 from gensig.dynamics.mesh_teeth import MeshTeeth
-
-Array = NDArray[np.float64]
 
 # motions that a mesh acts on: x, y and rotation of its driving gear a and its driven gear b;
 # helical gears that move along their axes have more after them
@@ -42,7 +40,7 @@ class Mesh:
 
     name: str
     teeth: MeshTeeth
-    touched: NDArray[np.int64]
+    touched: Integers
     reach: Array
     slide: Array
     stiffness: float
@@ -165,7 +163,7 @@ class Equations:
 
     def rates(
         self, mesh_stiffness: Array, mesh_damping: Array | None = None
-    ) -> NDArray[np.complex128]:
+    ) -> Complex:
         """Eigenvalues in 1/s with every mesh held as in ``closed``."""
         n = len(self.mass)
         stiffness, damping = self.closed(mesh_stiffness, mesh_damping)

@@ -8,14 +8,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics._layout import MOST_PAIRS
 from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
 from gensig.mesh.tooth_table import ToothTable
-
-Array = NDArray[np.float64]
 
 AXIAL_DOFS = (
     "pinion_z",

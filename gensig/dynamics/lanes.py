@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array, Flags, Integers
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._layout import COLUMNS, FAR_NEAR
 from gensig.dynamics._vector import n_lanes
@@ -17,8 +18,6 @@ from gensig.dynamics.equations import Mesh
 from gensig.dynamics.helical import pitches
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.mesh.tooth_table import ToothTable, left_out_energy
-
-Array = NDArray[np.float64]
 
 MOST_PAIRS = 2  # for each distinct tooth; with more, spur teeth are stored one by one
 
@@ -39,7 +38,7 @@ class ToothRows:
     """
 
     values: Array
-    row: NDArray[np.int64]
+    row: Integers
     pinion_stride: int
     wheel_first: int
 
@@ -64,10 +63,10 @@ class MeshLanes:
 
     rows: list[ToothRows]
     exact: Array
-    indices: NDArray[np.int64]
+    indices: Integers
     depth: Array
     bend: Array
-    tooth_row: NDArray[np.int64]
+    tooth_row: Integers
     tooth_error: Array
     tooth_tilt: Array
 
@@ -166,9 +165,7 @@ def near_positions(teeth: MeshTeeth) -> tuple[float, float]:
     return float(position[first]), float(position[last])
 
 
-def _mesh_indices(
-    meshes: Sequence[MeshTeeth], teeth: Sequence[ToothRows]
-) -> NDArray[np.int64]:
+def _mesh_indices(meshes: Sequence[MeshTeeth], teeth: Sequence[ToothRows]) -> Integers:
     """Indices of every lane into the tables, (lane, row)."""
     indices = []
     first_tooth, first_value = 0, 0
@@ -240,7 +237,7 @@ def tooth_rows(table: ToothTable) -> ToothRows:
     )
 
 
-def _teeth_one_by_one(table: ToothTable, is_there: NDArray[np.bool_]) -> ToothRows:
+def _teeth_one_by_one(table: ToothTable, is_there: Flags) -> ToothRows:
     """Rows of the distinct teeth of both gears; ``is_there`` (tooth,)."""
     kinds = [table.pinion.kind, table.wheel.kind]
     rows = [

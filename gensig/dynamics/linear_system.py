@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from gensig.arrays import Array, Complex
 from gensig.errors import SimulationError
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 ASYMMETRIC = 1e-9
 
@@ -45,7 +42,7 @@ class LinearSystem:
             if np.max(np.abs(matrix - matrix.T)) > ASYMMETRIC * np.max(np.abs(matrix)):
                 raise ValueError(f"{name} must be symmetric")
 
-    def dynamic_stiffness(self, frequency: Array) -> ComplexArray:
+    def dynamic_stiffness(self, frequency: Array) -> Complex:
         """K + i H + i w C - w^2 M, (frequency, dof, dof), at angular frequencies (frequency,)
         rad/s.
         """
@@ -56,7 +53,7 @@ class LinearSystem:
             - np.square(w) * self.mass
         )
 
-    def response(self, force: ComplexArray, frequency: Array) -> ComplexArray:
+    def response(self, force: Complex, frequency: Array) -> Complex:
         """Complex amplitudes, (frequency, dof), of forces (frequency, dof) at frequencies in
         rad/s, none of them 0.
 

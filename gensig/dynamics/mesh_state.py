@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array, Flags
 from gensig.dynamics._layout import N_SEEN, SEEN_FORCE, SEEN_NEWEST, SEEN_PAIRS
 from gensig.dynamics.helical import pitches
 from gensig.dynamics.mesh_teeth import MeshTeeth
-
-Array = NDArray[np.float64]
 
 NO_TOOTH = -1
 
@@ -39,8 +38,8 @@ class MeshState:
     wheel_tooth: NDArray[np.int16]
     load_share: Array
     force: Array
-    contact_lost: NDArray[np.bool_]
-    fault_engaged: NDArray[np.bool_]
+    contact_lost: Flags
+    fault_engaged: Flags
 
     def since(self, sample: int) -> MeshState:
         """The state from a sample on."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.geometry.contact import GearPair
 from gensig.mesh.load_distribution import (
     Meeting,
@@ -17,8 +17,6 @@ from gensig.mesh.load_distribution import (
     static_mesh,
 )
 from gensig.mesh.tooth_table import GearTeeth, ToothTable
-
-Array = NDArray[np.float64]
 
 PER_PITCH = 32  # phases of a base pitch over which the stiffness is averaged
 # over a turn of the wheel, at which static loads give the mean friction: a prime, so that the rolls

@@ -11,8 +11,8 @@ from functools import cached_property
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.bodies import HOUSING, Bodies, Motion, Spring
 from gensig.dynamics.equations import PAIR_SLIDE, Equations, Mesh
 from gensig.dynamics.helical import AXIAL_DOFS, axial_reach, pitches
@@ -23,8 +23,6 @@ from gensig.errors import ConfigError
 from gensig.mesh.tooth_table import ToothTable
 from gensig.operation.setpoint import Operating
 from gensig.units import split_unit, unit
-
-Array = NDArray[np.float64]
 
 PAIR_DOFS = (
     "pinion_x",

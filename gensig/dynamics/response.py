@@ -10,15 +10,12 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Complex
 from gensig.dynamics.linear_system import LinearSystem, single_thread
 from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.dynamics.pair import Body, RunningPair
 from gensig.units import SPEED, check_choice
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # motions of a gear that forces act on, in the order of every (..., 3) force
 GEAR_AXES = ("x", "y", "rotation")

@@ -16,14 +16,15 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import connection
+from multiprocessing import connection, resource_tracker
+from types import FrameType
 from typing import Any, TypeVar
 
 from gensig.execution.base import THREAD_VARIABLES, TRIES, ShardFailure, T
-from gensig.execution.held_signals import interrupts_unseen, stops_held
 from gensig.text.escaping import set_warning_lines
 
 Item = TypeVar("Item")
+STOPPING = (signal.SIGINT, signal.SIGTERM)
 HELD_SECONDS = 0.2  # longest that a signal waits while results are waited for
 
 _worker: dict[str, Callable[[Any], Any]] = {}
@@ -149,6 +150,51 @@ def _finished(futures: Iterable[Future[T]]) -> set[Future[T]]:
         with stops_held():
             done = wait(futures, HELD_SECONDS, return_when=FIRST_COMPLETED).done
     return done
+
+
+@contextmanager
+def stops_held() -> Iterator[None]:
+    """A signal that would stop this process takes effect at the end of the block.
+
+    An exception in the midst of the block would lose a process that has just begun. In other
+    threads than the main one no signal raises, and where a signal ends the process at once, it
+    still does.
+    """
+    came: list[int] = []
+
+    def note(number: int, _frame: FrameType | None) -> None:
+        came.append(number)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {}
+    try:
+        for number in STOPPING:
+            handler = signal.getsignal(number)
+            if callable(handler):
+                before[number] = handler
+                signal.signal(number, note)
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for each in dict.fromkeys(came):
+            signal.raise_signal(each)
+
+
+@contextmanager
+def interrupts_unseen() -> Iterator[None]:
+    """Processes that start in this block never see Ctrl-C, which the parent answers."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # would lift the mask when it starts by itself
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

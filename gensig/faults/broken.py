@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import FaultError
 from gensig.faults.base import Fault, Growth, require_choice, require_not_negative
 from gensig.faults.flank_loss import (
@@ -17,8 +17,6 @@ from gensig.faults.flank_loss import (
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth
 from gensig.units import unit
-
-Array = NDArray[np.float64]
 
 CHIP_SHAPES = {"triangular": 0.5, "rectangular": 1.0}  # share of height x width
 N_STRIPS = 32  # across a triangular chip

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import FaultError
 from gensig.faults.base import (
     Fault,
@@ -20,8 +20,6 @@ from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import RootCrack, Tooth
 from gensig.geometry.tooth_profile import root_curve_point, root_curve_slope
 from gensig.units import unit
-
-Array = NDArray[np.float64]
 
 CRACK_STARTS = ("arc_mid", "gamma_mid")
 CRACK_FRONTS = ("straight", "parabolic", "linear")

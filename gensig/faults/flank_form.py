@@ -9,8 +9,8 @@ from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.faults.base import (
     Fault,
     Growth,
@@ -21,8 +21,6 @@ from gensig.faults.base import (
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth
 from gensig.units import unit
-
-Array = NDArray[np.float64]
 
 N_SLICES = 40  # across the face of a misaligned tooth
 RELIEF_CURVES = {"linear": 1, "parabolic": 2}  # exponent of the share of the length

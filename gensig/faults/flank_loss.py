@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import FaultError
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth
 from gensig.geometry.tooth_profile import involute_point, root_curve
-
-Array = NDArray[np.float64]
 
 SHAPES = {"rectangular": 1.0, "elliptic": 0.25 * math.pi}  # share of length x width
 N_STRIPS = 24  # across an ellipse

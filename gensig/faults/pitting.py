@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gensig.errors import FaultError
 from gensig.faults.base import (
@@ -33,8 +32,6 @@ from gensig.faults.flank_loss import (
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth
 from gensig.units import unit
-
-Array = NDArray[np.float64]
 
 N_SLICES = 40  # across the face, on which many pits are drawn
 MOST_PITS = 20000

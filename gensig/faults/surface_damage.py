@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.faults.base import Fault, Growth, require, require_not_negative
 from gensig.faults.flank_loss import (
     Patch,
@@ -19,8 +19,6 @@ from gensig.faults.flank_loss import (
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth
 from gensig.units import unit
-
-Array = NDArray[np.float64]
 
 N_SLICES = 40  # across the face
 LEAST_SPALL = 0.5  # of the largest spall: sizes are uniform from here to 1

@@ -12,13 +12,12 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import GeometryError
 from gensig.geometry.gear import Gear
 from gensig.geometry.involute import inverse_involute, involute
 
-Array = NDArray[np.float64]
 Position = TypeVar("Position", float, Array)
 
 SIDES = ("pinion", "wheel")  # the two gears of a pair, the driving one first

@@ -11,11 +11,9 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.geometry.gear import Gear
-
-Array = NDArray[np.float64]
 
 
 def root_curve(gear: Gear, gamma: Array) -> tuple[Array, Array]:

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError, TooShortError
 from gensig.implants.carriers import Carrier
 from gensig.implants.gearing import Gearing
 from gensig.signals.resampling import PASS_SHARE
 from gensig.signals.transfer.order_lines import Lines, find_lines
 from gensig.signals.transfer.path_gain import fit_path, minimum_phase
-
-Array = NDArray[np.float64]
 
 N_LINES = 2048  # of the response; the impulse response has twice as many samples
 FEWEST_TURNS = 8.0  # of the slowest shaft, so that its orders are resolved

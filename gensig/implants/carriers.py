@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dataset.storage.atomic import sha256_file
 from gensig.errors import ConfigError, TooShortError
 from gensig.implants.gearing import Gearing
@@ -18,8 +18,6 @@ from gensig.signals.recording import Recording, read_file, recording_of
 from gensig.signals.resampling import PASS_SHARE
 from gensig.signals.speed_ridge import wandering_mesh_cycles
 from gensig.signals.tacho import pulse_times
-
-Array = NDArray[np.float64]
 
 SAME_RATE = 1e-3  # relative; times in files are rounded
 LOWEST_RATE = 5000.0  # Hz; below, no gear mesh is left with its harmonics

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.implants.simulated_pairs import HEALTHY, ONE_TOOTH
-
-Array = NDArray[np.float64]
 
 # all assumed: a burst's decay, and the angles of a turn at which many teeth burst
 DECAY = (0.0003, 0.003)  # s

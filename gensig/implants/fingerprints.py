@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.signals.recording import Recording
 from gensig.signals.resampling import rate_change
 
-Array = NDArray[np.float64]
 Signs = NDArray[np.int8]
 
 RATE = 4000.0  # Hz; carriers have 5 kHz or more

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Integers
 from gensig.dataset.plan import Plan, record_ids, shard_rows
 from gensig.errors import ConfigError
 from gensig.implants.blocks import Block, Cut
@@ -17,7 +17,6 @@ from gensig.implants.gearing import Gearing
 from gensig.implants.options import ImplantOptions
 from gensig.implants.simulated_pairs import CLASSES, HEALTHY, SimulatedPairs
 
-IntArray = NDArray[np.int64]
 Value = str | int | float
 
 PLAN_STREAM, RECORD_STREAM = 7101, 7102
@@ -133,7 +132,7 @@ def _present_classes(pairs: SimulatedPairs) -> tuple[str, ...]:
 
 def _pools(
     pairs: SimulatedPairs, n_blocks: int, rng: np.random.Generator
-) -> list[IntArray]:
+) -> list[Integers]:
     """Sources in as many pools as blocks, or fewer: each with records of all faulty classes.
 
     A set of gears is in one pool.
@@ -153,7 +152,7 @@ def _pools(
 
 def _draw(
     pairs: SimulatedPairs,
-    pool: IntArray,
+    pool: Integers,
     name: str,
     block: Block,
     latest: int,
@@ -234,7 +233,7 @@ def _row(
     }
 
 
-def _repeats(rows: Sequence[Mapping[str, Value]]) -> IntArray:
+def _repeats(rows: Sequence[Mapping[str, Value]]) -> Integers:
     """Number of each row among those of its condition and class, from 0."""
     seen: Counter[tuple[Value, Value]] = Counter()
     numbers = []

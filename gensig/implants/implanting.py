@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array, Integers
 from gensig.errors import DatasetError
 from gensig.implants.blocks import Block, Cut, cut_blocks
 from gensig.implants.carrier_path import (
@@ -48,7 +49,6 @@ from gensig.signals.transfer.order_lines import Lines
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
-Array = NDArray[np.float64]
 Given = str | Path | Recording | HealthyRecording
 
 
@@ -70,10 +70,10 @@ class Implants:
     """
 
     acceleration: NDArray[np.float32]
-    label: NDArray[np.int64]
+    label: Integers
     class_names: tuple[str, ...]
     gain_db: Array
-    block: NDArray[np.int64]
+    block: Integers
     blocks: tuple[Block, ...]
     draws: tuple[Draw, ...]
     sampling_rate: float

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Flags, Integers
 from gensig.dataset.columns import GEAR_PINION_TURNS
 from gensig.errors import DatasetError
 from gensig.implants.gearing import DRIVEN, DRIVING
@@ -16,7 +16,6 @@ from gensig.implants.gearing import DRIVEN, DRIVING
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
-Array = NDArray[np.float64]
 
 HEALTHY, ONE_TOOTH, MANY_TEETH = "healthy", "one_tooth", "many_teeth"
 CLASSES = (HEALTHY, ONE_TOOTH, MANY_TEETH)
@@ -135,7 +134,7 @@ class SimulatedPairs:
         pinion, wheel = data.n_teeth(DRIVING)[record], data.n_teeth(DRIVEN)[record]
         return float(pinion / wheel)
 
-    def _labels(self) -> NDArray[np.int64]:
+    def _labels(self) -> Integers:
         data, classes, unknown = self.data, dict[str, int](), set[str]()
         for faults in np.unique(data.column("faults_json")).tolist():
             name = class_of(faults)
@@ -156,7 +155,7 @@ class SimulatedPairs:
             )
         return label.astype(np.int64)
 
-    def _is_heard(self, records: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def _is_heard(self, records: Integers) -> Flags:
         """Records whose residual is more than the rounding of stored samples, (record,)."""
         least = LEAST_RESIDUAL.get(self.data.sample_type, 1e-6)
         heard = np.zeros(len(records), dtype=bool)

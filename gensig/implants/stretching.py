@@ -13,11 +13,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import DatasetError
 from gensig.signals.averaging import interpolate
 from gensig.signals.resampling import rate_change
-
-Array = NDArray[np.float64]
 
 FINER = (
     2  # upsampling before the interpolation, whose error grows towards half the rate

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.faults.crack import N_STRIPS, Crack
 from gensig.geometry.contact import GearPair
@@ -20,8 +20,6 @@ from gensig.life.growth import GrowthLaw, GrowthOptions
 from gensig.material import Material
 from gensig.mesh.root_crack import DEEPEST, crack_compliance
 from gensig.units import check_limits, check_positive, unit
-
-Array = NDArray[np.float64]
 
 N_DEPTHS = 161
 N_POINTS = 9  # over the zone in which one pair carries everything

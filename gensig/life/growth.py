@@ -9,12 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Flags, Integers
 from gensig.errors import ConfigError
 from gensig.life.load_history import History
-
-Array = NDArray[np.float64]
 
 WIDEST = 3.0  # standard deviations: nothing is drawn beyond
 
@@ -115,8 +113,8 @@ class Course:
     running: Array
     turns: Array
     size: Array
-    setpoint: NDArray[np.int64]
-    growing: NDArray[np.bool_]
+    setpoint: Integers
+    growing: Flags
     has_failed: bool
 
     def at(self, running: float) -> tuple[int, float]:

@@ -7,13 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError, ExtrapolationError, SimulationError
 from gensig.life.wear.wear_case import WearCase
 from gensig.life.wear.wear_life import hours, wear_life
-
-Array = NDArray[np.float64]
 
 EXPONENT_STEP = 0.05  # of the torque, on either side
 

@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Integers
 from gensig.errors import ConfigError
 
-Array = NDArray[np.float64]
 MOST_BLOCKS = 200_000
 
 
@@ -28,7 +27,7 @@ class History:
 
     begin: Array
     end: Array
-    setpoint: NDArray[np.int64]
+    setpoint: Integers
     speed: Array
     torque: Array
 

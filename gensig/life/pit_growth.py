@@ -10,17 +10,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.faults.flank_loss import flank_area
 from gensig.faults.pitting import DistributedPitting
 from gensig.geometry.contact import GearPair
 from gensig.life.growth import GrowthLaw, GrowthOptions
 from gensig.material import Material
+from gensig.mesh.sliced.slice_pressure import contact_pressure
+from gensig.mesh.sliced.slices import SlicedMesh, loaded_contact
 from gensig.units import check_limits, check_positive, unit
-
-Array = NDArray[np.float64]
 
 N_SIZES = 121
 
@@ -133,6 +133,34 @@ def contact_stress(pair: GearPair, material: Material, torque: float) -> float:
     reduced = material.youngs_modulus / (1.0 - material.poisson_ratio**2)
     load = torque / pair.pinion.base_radius / pair.face_width
     return math.sqrt(load * reduced * curvature / (2.0 * math.pi))
+
+
+def sliced_contact_stress(
+    mesh: SlicedMesh, material: Material, torques: Array, exponent: float
+) -> Array:
+    """Contact stress whose damage is that of the flank's slices on average, (torque,) Pa.
+
+    Parameters
+    ----------
+    torques : (torque,) N m    of the pinion
+    exponent : of the stress in the pitting line
+
+    Hertz's pressure of every slice as it passes the pitch point, where ISO 6336-2 takes it, with
+    its load from the equilibrium of the mesh; s = (mean of p_j^q over the face)^(1 / q), which is
+    Miner's damage averaged over the face: pits come anywhere on it.
+    """
+    pair = mesh.pair
+    roll = pair.pitch_point + mesh.lag
+    slices = np.arange(len(roll))
+    stresses = []
+    for torque in torques:
+        contact = loaded_contact(mesh, roll, float(torque) / pair.pinion.base_radius)
+        pressure = contact_pressure(mesh, contact, material)
+        passing = np.argmax(contact.pair_index == 0, axis=1)
+        damage = pressure[slices, passing, slices] ** exponent
+        mean = np.average(damage, weights=mesh.slice_width)
+        stresses.append(mean ** (1.0 / exponent))
+    return np.array(stresses)
 
 
 def pit_growth(

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.faults.base import Fault
 from gensig.faults.crack import N_STRIPS, Crack
 from gensig.geometry.contact import GearPair
@@ -23,7 +23,6 @@ from gensig.material import Material
 from gensig.mesh.sliced.slice_energy import structure_energy
 from gensig.mesh.sliced.slices import SlicedMesh, contact_phases, settled_contact
 
-Array = NDArray[np.float64]
 MeshOf = Callable[[Sequence[Fault]], SlicedMesh]
 
 DEPTH_STEP = 10  # nodes of the law between two depths at which the mesh is solved

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.life.growth import Course
-
-Array = NDArray[np.float64]
 
 SPACINGS = ("linear", "logarithmic", "adaptive")
 LAST_SHARE = 1e-3  # of the life, left at the last look but one of a logarithmic row

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import warnings
 
-import numpy as np
-from numpy.typing import NDArray
-
+from gensig.arrays import Array
 from gensig.errors import ExtrapolationError
 from gensig.geometry.gear import Gear
 from gensig.material import Material
@@ -16,8 +14,6 @@ from gensig.mesh.fillet_foundation import (
     fillet_foundation_compliance,
 )
 from gensig.mesh.options import MeshOptions
-
-Array = NDArray[np.float64]
 
 # rim thickness over module: checked against finite elements down to 2, in one case at 1.75
 CHECKED_RIM, THINNEST_RIM = 2.0, 1.5

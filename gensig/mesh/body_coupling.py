@@ -9,14 +9,12 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth_profile import load_angle
 from gensig.material import Material
-
-Array = NDArray[np.float64]
 
 STRESS_EXPONENT = 6  # calibrated: bending stress on the root arc goes as xi (1 - xi^6)
 SERIES_LENGTH = 12.0  # harmonics up to n theta_f = 12: cross terms to 1e-4

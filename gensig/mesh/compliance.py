@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.geometry.tooth import Tooth
 from gensig.geometry.tooth_profile import involute_point, load_angle
 from gensig.material import Material
 from gensig.mesh.tooth_sections import sections
-
-Array = NDArray[np.float64]
 
 # parabolic shear of a long prismatic beam, spur paper eq. (4), or even shear: see tooth_compliance
 SHEAR_FACTORS = {"to_contact": 1.2, "to_centreline": 1.0}

@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Integers
 from gensig.errors import FaultError
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth
 from gensig.mesh._kernels import lower_envelope, share_over_slices
 from gensig.mesh.local_contact import ContactLaw
-
-Array = NDArray[np.float64]
 
 SHAPE_DECIMALS = 15  # of a metre: rounding noise does not make two slices different
 # law=paper has no gaps: flank deeper than this share of the module does not bear
@@ -40,7 +38,7 @@ class FlankContacts:
 
     center: Array
     relative_radius: Array
-    of_phase: NDArray[np.int64]
+    of_phase: Integers
     content: tuple[bytes, bytes]
 
 
@@ -105,7 +103,7 @@ def _envelope(
     return gap[0]
 
 
-def _shapes(standing_back: Array) -> tuple[Array, NDArray[np.int64], Array]:
+def _shapes(standing_back: Array) -> tuple[Array, Integers, Array]:
     """Distinct shapes of the rows without their offsets, index of each row's shape, and offsets.
 
     Slices of a flank that is only moved or tilted across the face share their envelope.

@@ -6,13 +6,11 @@ import math
 import warnings
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ExtrapolationError
 from gensig.geometry.gear import Gear
 from gensig.material import Material
-
-Array = NDArray[np.float64]
 
 # rows of X = A/th_f^2 + B h_f^2 + C h_f/th_f + D/th_f + E h_f + F, in the order A..F
 COEFFICIENTS = {
@@ -52,9 +50,23 @@ def fillet_foundation_compliance(
     theta_f and u_f = r_b/cos(angle) - r_f. Assumes an isolated tooth and a bore clamped all
     around; plane stress.
     """
-    values = body_coefficients(gear, allow_extrapolation=allow_extrapolation)
     height = gear.base_radius / np.cos(load_angle) - gear.root_radius
     lever = height / (2.0 * gear.root_radius * gear.root_half_angle)
+    return lever_compliance(
+        gear, load_angle, lever, material, allow_extrapolation=allow_extrapolation
+    )
+
+
+def lever_compliance(
+    gear: Gear,
+    load_angle: Array,
+    lever: Array,
+    material: Material,
+    *,
+    allow_extrapolation: bool,
+) -> Array:
+    """``fillet_foundation_compliance`` for a lever u_f / s_f of the load, (phase,) m/N."""
+    values = body_coefficients(gear, allow_extrapolation=allow_extrapolation)
     bracket = (
         values["L"] * lever**2
         + values["M"] * lever
@@ -93,5 +105,5 @@ def _check_range(
             f"{gear.name}: {shown} lies outside {low:g}..{high:g}, where the gear-body fit was "
             f"checked against finite elements",
             ExtrapolationWarning,
-            stacklevel=4,
+            stacklevel=5,
         )

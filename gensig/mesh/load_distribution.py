@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import Tooth
 from gensig.material import Material
@@ -21,8 +21,6 @@ from gensig.mesh.modification import PLAIN, PairModification
 from gensig.mesh.options import MeshOptions
 from gensig.mesh.pair_table import pair_table
 from gensig.mesh.tooth_table import GearTeeth, ToothTable
-
-Array = NDArray[np.float64]
 
 LOAD_ROUNDS = 3
 LEAST_LOAD_SHARE = 0.02  # local compliance has no limit as the load falls to 0

@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth_profile import involute_point, load_angle
 from gensig.material import Material
 from gensig.mesh.options import MeshOptions
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,16 +13,14 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.geometry.contact import SIDES, GearPair
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.mesh.thermal.thermal_growth import PairGrowth
 from gensig.units import from_si, unit
-
-Array = NDArray[np.float64]
 
 SHAPES = {"linear": 1, "parabolic": 2}  # exponent of the share of the height
 N_SLICES = 40  # across the face of a spur tooth with a modified lead

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Integers
 from gensig.errors import ExtrapolationError
 from gensig.geometry.contact import SIDES, GearPair, corner_gap_by_pinion
 from gensig.geometry.gear import Gear
@@ -31,8 +31,6 @@ from gensig.mesh.options import MeshOptions
 from gensig.mesh.root_crack import crack_compliance
 from gensig.mesh.smooth_table import smooth
 from gensig.mesh.tooth_table import GearTeeth, TablePart, ToothTable
-
-Array = NDArray[np.float64]
 
 # tooth pairs at once: positions u - 1, u, u + 1, u + 2 base pitches, u in 0..1
 N_PAIRS = 4
@@ -381,7 +379,7 @@ def _gear_table(
 
 def distinct_teeth(
     sound: Tooth, teeth: Mapping[tuple[str, int], Tooth]
-) -> tuple[list[Tooth], NDArray[np.int64]]:
+) -> tuple[list[Tooth], Integers]:
     """Distinct objects among one gear's teeth, and the index of each tooth's object, (tooth,).
 
     The first is the healthy tooth; ``teeth`` are the others by (gear, tooth).

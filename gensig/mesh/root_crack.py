@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ExtrapolationError
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import RootCrack, Tooth
@@ -14,8 +14,6 @@ from gensig.geometry.tooth_profile import load_angle
 from gensig.material import Material
 from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.root_crack_coefficients import COEFFICIENTS
-
-Array = NDArray[np.float64]
 
 # range compared with finite elements: depth over root chord, angle to the centreline
 DEEPEST = 0.8

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gensig.arrays import Array
 
 
 def smooth(values: Array, distance: float, limit: float) -> tuple[Array, Array]:

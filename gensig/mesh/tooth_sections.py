@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import FaultError
 from gensig.geometry.tooth import RootCrack, Tooth
-
-Array = NDArray[np.float64]
 
 
 def sections(tooth: Tooth, *, papers_crack: bool) -> tuple[Array, Array]:

@@ -7,21 +7,18 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Flags, Integers
 from gensig.geometry.contact import GearPair
 from gensig.mesh.options import MeshOptions
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GearTeeth:
     """Kinds of the teeth of a gear: ``kind`` (tooth,), ``present`` (kind,). Kind 0 is healthy."""
 
-    kind: Index
-    present: NDArray[np.bool_]
+    kind: Integers
+    present: Flags
 
     @property
     def healthy(self) -> GearTeeth:
@@ -109,7 +106,7 @@ class ToothTable:
         return 0.5 * self.pair.face_width * math.tan(self.pair.base_helix_angle)
 
     @property
-    def present(self) -> NDArray[np.bool_]:
+    def present(self) -> Flags:
         """True for pairs of teeth neither of which is missing, (pinion kind, wheel kind)."""
         return self.pinion.present[:, None] & self.wheel.present[None, :]
 

@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.operation.courses import Profile, Ramp, RandomWalk, Ripple
 from gensig.operation.setpoint import Operating
 from gensig.options.configuration import Section
 from gensig.text.user_file import check_columns, read_table
 from gensig.units import check_choice, is_number, naming, read, to_si
-
-Array = NDArray[np.float64]
 
 QUANTITIES = {"speed_profile": "speed_rpm", "torque_profile": "torque_nm"}
 RIPPLES = ("speed_ripple", "torque_ripple")

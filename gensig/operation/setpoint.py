@@ -7,13 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.operation.courses import FASTEST_RIPPLE, SHORTEST_PIECE, Profile, Ripple
 from gensig.units import check_positive, unit
-
-Array = NDArray[np.float64]
 
 COURSES = ("speed_profile", "torque_profile", "speed_ripple", "torque_ripple")
 

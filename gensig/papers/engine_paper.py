@@ -26,7 +26,14 @@ from gensig.driveline.in_time import (
 from gensig.driveline.linear.forced import Waterfall, run_of_speeds
 from gensig.driveline.time_root_stress import root_stress_in_time
 from gensig.options.compose import compose
-from gensig.papers.paper_figure import Array, Curve, Panel, Paper, PaperFigure
+from gensig.papers.paper_figure import (
+    Array,
+    Curve,
+    Panel,
+    Paper,
+    PaperFigure,
+    printed_level,
+)
 from gensig.units import from_si, to_si
 
 ENGINE = ("system=engine_gear_train", "system.lateral=true")
@@ -54,6 +61,7 @@ RUN_SHOWN = (1.0, 2.5, 5.0, 7.5, 10.0)  # orders of the crank
 RUN_HIGHEST = 200.0  # Hz
 DURATION = 1.0  # s, 14 cycles at 1688 r/min
 SHOWN = 2  # cycles
+CYCLES = np.array([0.0, SHOWN])
 N_ORDERS = 80  # half orders
 RPM = from_si("speed_rpm", 1.0)
 ASSUMED = (
@@ -90,30 +98,22 @@ def speed(number: str, place: str) -> PaperFigure:
         own = RPM * motion.speed[list(NODES).index(place)]
         cycles = (motion.crank_angle - motion.crank_angle[0]) / (4.0 * math.pi)
         shown = cycles < SHOWN
-        curves.append(Curve(label=name, x=cycles[shown], y=own[shown]))
+        curves.append(Curve(name, cycles[shown], own[shown]))
         half = float(np.median(fluctuations(own[None], motion.crank_angle)))
         found.append(f"{name} {half:.3g} r/min")
     for label, half in zip(("computed", "measured"), PRINTED[place], strict=True):
         for end, sign in (("highest", 1.0), ("lowest", -1.0)):
-            curves.append(_level(f"printed, {label}, {end}", sign * half))
+            curves.append(
+                printed_level(f"printed, {label}, {end}", sign * half, CYCLES)
+            )
     computed, measured = PRINTED[place]
-    panel = Panel(
-        title=place,
-        x_label="cycles of the engine",
-        y_label="speed less its mean, r/min",
-        curves=tuple(curves),
-    )
+    panel = Panel(place, "cycles of the engine", "speed less its mean, r/min", curves)
     return PaperFigure(
-        title=f"Speed of the {place} (figure {number})",
-        panels=(panel,),
-        reason=f"Half the peak to peak in a cycle: {', '.join(found)}; printed {computed:g}, "
+        f"Speed of the {place} (figure {number})",
+        [panel],
+        f"Half the peak to peak in a cycle: {', '.join(found)}; printed {computed:g}, "
         f"measured {measured:g}. {ASSUMED}",
     )
-
-
-def _level(label: str, value: float) -> Curve:
-    ends = np.array([0.0, SHOWN])
-    return Curve(label=label, x=ends, y=np.full(2, value), is_printed=True)
 
 
 def spectrum(number: str, place: str) -> PaperFigure:
@@ -124,17 +124,12 @@ def spectrum(number: str, place: str) -> PaperFigure:
         amplitudes = order_amplitudes(motion.angle, motion.crank_angle, N_ORDERS)
         own: Array = np.degrees(amplitudes[list(NODES).index(place)])
         orders: Array = 0.5 * np.arange(1.0, len(own) + 1.0)
-        curves.append(Curve(label=name, x=orders, y=own))
-    panel = Panel(
-        title=place,
-        x_label="order of the crank",
-        y_label="angle, degrees",
-        curves=tuple(curves),
-    )
+        curves.append(Curve(name, orders, own))
+    panel = Panel(place, "order of the crank", "angle, degrees", curves)
     return PaperFigure(
-        title=f"Angular displacement of the {place} (figure {number})",
-        panels=(panel,),
-        reason=f"The scale of the figure is not printed. {ASSUMED}",
+        f"Angular displacement of the {place} (figure {number})",
+        [panel],
+        f"The scale of the figure is not printed. {ASSUMED}",
     )
 
 
@@ -169,29 +164,24 @@ def waterfall(number: str, place: str) -> PaperFigure:
         frequency: Array = order * run.speeds / (2.0 * math.pi)
         angle: Array = np.log10(np.degrees(run.angle[:, column]))
         is_shown = frequency <= RUN_HIGHEST
-        curves.append(
-            Curve(label=f"order {order:g}", x=frequency[is_shown], y=angle[is_shown])
-        )
+        curves.append(Curve(f"order {order:g}", frequency[is_shown], angle[is_shown]))
     ends = [f(curve.y) for f in (np.min, np.max) for curve in curves]
     for mode, frequency_hz in enumerate(MEASURED_MODES, start=1):
         curves.append(
             Curve(
-                label=f"measured, mode {mode}",
-                x=np.full(2, frequency_hz),
-                y=np.array([min(ends), max(ends)]),
+                f"measured, mode {mode}",
+                np.full(2, frequency_hz),
+                np.array([min(ends), max(ends)]),
                 is_printed=True,
             )
         )
     panel = Panel(
-        title=place,
-        x_label="frequency of the order, Hz",
-        y_label="angle in degrees, log10",
-        curves=tuple(curves),
+        place, "frequency of the order, Hz", "angle in degrees, log10", curves
     )
     return PaperFigure(
-        title=f"Waterfall of the {place}'s angle by orders (figure {number})",
-        panels=(panel,),
-        reason="The paper's map is measured and its colours have no scale; the natural "
+        f"Waterfall of the {place}'s angle by orders (figure {number})",
+        [panel],
+        "The paper's map is measured and its colours have no scale; the natural "
         "frequencies that it reads off are in table 1. Ours is steady at each speed, without "
         "load, teeth always in contact. Modes 2 and 3 lie 2 and 5 % lower: table A1 does not "
         "give table 1 (docs/validation/engine.md).",
@@ -220,27 +210,17 @@ def root_stress(number: str) -> PaperFigure:
     iso = found.gears[gear].stress * 1e-6
     ends = np.array([roll[0], roll[-1]])
     curves = [
-        Curve(label="largest of all pairs", x=roll, y=passes.max(axis=0)),
-        Curve(label="median of all pairs", x=roll, y=np.median(passes, axis=0)),
-        Curve(label="one pair, ISO 6336-3", x=ends, y=np.full(2, iso)),
-        Curve(
-            label="printed",
-            x=ends,
-            y=np.full(2, PRINTED_STRESS[with_dampers]),
-            is_printed=True,
-        ),
+        Curve("largest of all pairs", roll, passes.max(axis=0)),
+        Curve("median of all pairs", roll, np.median(passes, axis=0)),
+        Curve("one pair, ISO 6336-3", ends, np.full(2, iso)),
+        printed_level("printed", PRINTED_STRESS[with_dampers], roll),
     ]
     title = "with sprung dampers" if with_dampers else "without dampers"
-    panel = Panel(
-        title=title,
-        x_label="roll of the pair, mm",
-        y_label="root stress, MPa",
-        curves=tuple(curves),
-    )
+    panel = Panel(title, "roll of the pair, mm", "root stress, MPa", curves)
     return PaperFigure(
-        title=f"Root stress of the pump gear (figure {number})",
-        panels=(panel,),
-        reason="Impacts of teeth that part and come back carry twice the printed force; pairs "
+        f"Root stress of the pump gear (figure {number})",
+        [panel],
+        "Impacts of teeth that part and come back carry twice the printed force; pairs "
         f"that share it bring the stress near the printed one. {ASSUMED}",
     )
 

@@ -89,14 +89,9 @@ def transmission_error() -> PaperFigure:
             error = pair.transmission_error().error * 1e6
             periods = np.arange(len(error)) / len(error)
             ripple = f"{scheme}, {np.ptp(error):.3g} um from peak to peak"
-            curves.append(Curve(label=ripple, x=periods, y=error - error.mean()))
+            curves.append(Curve(ripple, periods, error - error.mean()))
         panels.append(
-            Panel(
-                title=name,
-                x_label="mesh periods",
-                y_label="transmission error less its mean, um",
-                curves=tuple(curves),
-            )
+            Panel(name, "mesh periods", "transmission error less its mean, um", curves)
         )
     printed = ", ".join(
         f"{scheme} {value} um"
@@ -104,9 +99,9 @@ def transmission_error() -> PaperFigure:
         if value is not None
     )
     return PaperFigure(
-        title="Transmission error (figures 5 to 8)",
-        panels=tuple(panels),
-        reason=f"Printed: {printed}. {BELOW}",
+        "Transmission error (figures 5 to 8)",
+        panels,
+        f"Printed: {printed}. {BELOW}",
     )
 
 
@@ -119,19 +114,17 @@ def run_up() -> PaperFigure:
             system = helical_pair(
                 PairParts(compose("generate", (SYSTEM, modification, *more)))
             )
-            curves.append(Curve(label=scheme, x=SPEEDS_RPM, y=run_up_level(system)))
+            curves.append(Curve(scheme, SPEEDS_RPM, run_up_level(system)))
         panels.append(
             Panel(
-                title=title,
-                x_label="speed, r/min",
-                y_label="bearings at mesh orders 1 to 3, dB re 1 m/s2",
-                curves=tuple(curves),
+                title,
+                "speed, r/min",
+                "bearings at mesh orders 1 to 3, dB re 1 m/s2",
+                curves,
             )
         )
     return PaperFigure(
-        title="Vibration before and after modification (figure 10)",
-        panels=tuple(panels),
-        reason=QUIETER,
+        "Vibration before and after modification (figure 10)", panels, QUIETER
     )
 
 

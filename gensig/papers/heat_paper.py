@@ -8,7 +8,13 @@ from functools import cache, partial
 import numpy as np
 
 from gensig.options.compose import compose
-from gensig.papers.paper_figure import Curve, Panel, Paper, PaperFigure
+from gensig.papers.paper_figure import (
+    Curve,
+    Panel,
+    Paper,
+    PaperFigure,
+    printed_level,
+)
 from gensig.systems.hot_pair import (
     COLD,
     SOFTENED,
@@ -89,58 +95,40 @@ def stiffness() -> PaperFigure:
         ("printed, cold", 2.592, 3.726),
         ("printed, hot", 2.878, 4.117),
     ):
-        pair.append(_level(f"{label}: highest", highest, pair[0].x))
-        mesh.append(_level(f"{label}: mean", mean, mesh[0].x))
+        pair.append(printed_level(f"{label}: highest", highest, pair[0].x))
+        mesh.append(printed_level(f"{label}: mean", mean, mesh[0].x))
     return PaperFigure(
-        title="Mesh stiffness with and without heat (figure 3)",
-        panels=(
-            Panel(
-                title="one pair",
-                x_label=FIRST_SLICE,
-                y_label=STIFFNESS,
-                curves=tuple(pair),
-            ),
-            Panel(
-                title="mesh",
-                x_label="mesh periods",
-                y_label=STIFFNESS,
-                curves=tuple(mesh),
-            ),
+        "Mesh stiffness with and without heat (figure 3)",
+        (
+            Panel("one pair", FIRST_SLICE, STIFFNESS, pair),
+            Panel("mesh", "mesh periods", STIFFNESS, mesh),
         ),
-        reason=STEEPER,
+        STEEPER,
     )
 
 
 def _add_stiffness(
     label: str, variant: Variant, pair: list[Curve], mesh: list[Curve]
 ) -> None:
-    pair.append(Curve(label=label, x=variant.position, y=variant.single / 1e9))
+    pair.append(Curve(label, variant.position, variant.single / 1e9))
     periods = np.arange(len(variant.mesh)) / len(variant.mesh)
-    mesh.append(Curve(label=label, x=periods, y=variant.mesh / 1e9))
-
-
-def _level(label: str, value: float, x: np.ndarray) -> Curve:
-    ends = np.array([x.min(), x.max()])
-    return Curve(label=label, x=ends, y=np.full(2, value), is_printed=True)
+    mesh.append(Curve(label, periods, variant.mesh / 1e9))
 
 
 def bulk() -> PaperFigure:
     """Figure 4: bulk temperature of both gears from the bore to the root circle."""
     state = hot_state(duty("gensig's default"))
     curves = tuple(
-        Curve(label=name, x=body.radius * 1e3, y=body.temperature)
+        Curve(name, body.radius * 1e3, body.temperature)
         for name, body in (("pinion", state.pinion), ("wheel", state.wheel))
     )
     panel = Panel(
-        title="bulk temperature",
-        x_label="radius, mm",
-        y_label="temperature, degrees Celsius",
-        curves=curves,
+        "bulk temperature", "radius, mm", "temperature, degrees Celsius", curves
     )
     return PaperFigure(
-        title="Bulk temperature (figure 4)",
-        panels=(panel,),
-        reason="The scale of the figure, the oil and its convection are not printed; oil of 60 "
+        "Bulk temperature (figure 4)",
+        [panel],
+        "The scale of the figure, the oil and its convection are not printed; oil of 60 "
         "degrees Celsius and 300 W/m2K are assumed.",
     )
 
@@ -158,22 +146,17 @@ def swept(number: str, name: str) -> PaperFigure:
         ):
             if variant in variants[0]:
                 mean = np.array([one[variant].mesh.mean() for one in variants]) / 1e9
-                curves.append(Curve(label=label, x=values * per_si, y=mean))
+                curves.append(Curve(label, values * per_si, mean))
                 change = 100 * (mean[-1] / mean[0] - 1)
                 changes.append(f"{label} {change:+.2g} %")
     change = 100 * (printed[1] / printed[0] - 1)
     ends = np.array([low, high]) * per_si
-    curves.append(Curve(label="printed", x=ends, y=np.array(printed), is_printed=True))
-    panel = Panel(
-        title="mesh, mean, hot",
-        x_label=x_label,
-        y_label=STIFFNESS,
-        curves=tuple(curves),
-    )
+    curves.append(Curve("printed", ends, np.array(printed), is_printed=True))
+    panel = Panel("mesh, mean, hot", x_label, STIFFNESS, curves)
     return PaperFigure(
-        title=f"Mesh stiffness over {name} (figure {number})",
-        panels=(panel,),
-        reason=f"From the first to the last: {', '.join(changes)}, printed {change:+.3g} %. "
+        f"Mesh stiffness over {name} (figure {number})",
+        [panel],
+        f"From the first to the last: {', '.join(changes)}, printed {change:+.3g} %. "
         f"{STEEPER}",
     )
 

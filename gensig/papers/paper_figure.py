@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TextIO
 
@@ -14,7 +14,7 @@ from gensig.text.csv_tables import write_rows
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class Curve:
     """One curve ``y`` over ``x``, (point,) each; ``is_printed`` if the paper prints it."""
 
@@ -24,22 +24,28 @@ class Curve:
     is_printed: bool = False
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+def printed_level(label: str, value: float, x: Array) -> Curve:
+    """A printed value as a line from the least to the greatest abscissa."""
+    ends = np.array([x.min(), x.max()])
+    return Curve(label, ends, np.full(2, value), is_printed=True)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Panel:
     """Curves on the same axes, with labels that have units."""
 
     title: str
     x_label: str
     y_label: str
-    curves: tuple[Curve, ...]
+    curves: Sequence[Curve]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class PaperFigure:
     """A figure of a paper, and the reason where ours differs from what is printed."""
 
     title: str
-    panels: tuple[Panel, ...]
+    panels: Sequence[Panel]
     reason: str = ""
 
     def write_csv(self, file: TextIO) -> None:

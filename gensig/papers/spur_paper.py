@@ -57,20 +57,15 @@ def stiffness() -> PaperFigure:
             roll = found.roll_angle * pitches
             shown = roll < SHOWN_PITCHES
             stiff = found.mesh_stiffness[shown] / 1e8
-            curves.append(Curve(label=name, x=roll[shown], y=stiff))
+            curves.append(Curve(name, roll[shown], stiff))
     panels = tuple(
-        Panel(
-            title=title,
-            x_label="roll, base pitches",
-            y_label="mesh stiffness, 1e8 N/m",
-            curves=tuple(curves),
-        )
+        Panel(title, "roll, base pitches", "mesh stiffness, 1e8 N/m", curves)
         for title, curves in (("healthy", sound), ("missing tooth", missing))
     )
     return PaperFigure(
-        title="Mesh stiffness (figure 5)",
-        panels=panels,
-        reason="The paper adds both pairs, whose bodies it counts twice; pairs that share the "
+        "Mesh stiffness (figure 5)",
+        panels,
+        "The paper adds both pairs, whose bodies it counts twice; pairs that share the "
         "gear bodies are softer together. " + ASSUMED,
     )
 
@@ -86,22 +81,17 @@ def response(number: str) -> PaperFigure:
         channel = list(system.sensing.channels).index("pinion_y")
         signal, rate = record.acceleration[channel], system.sensing.sampling_rate
         shown = signal[: int(SHOWN_TURNS * TURN * rate)]
-        times.append(Curve(label=name, x=np.arange(len(shown)) / rate, y=shown))
+        times.append(Curve(name, np.arange(len(shown)) / rate, shown))
         spectra.append(_spectrum(name, signal, rate))
     label = "pinion_y, m/s2"
     panels = (
-        Panel(title="time", x_label="time, s", y_label=label, curves=tuple(times)),
-        Panel(
-            title="spectrum",
-            x_label="frequency, Hz",
-            y_label=label,
-            curves=tuple(spectra),
-        ),
+        Panel("time", "time, s", label, times),
+        Panel("spectrum", "frequency, Hz", label, spectra),
     )
     return PaperFigure(
-        title=f"Response to a {title} (figure {number})",
-        panels=panels,
-        reason=f"{SEEN[number]} {ASSUMED}",
+        f"Response to a {title} (figure {number})",
+        panels,
+        f"{SEEN[number]} {ASSUMED}",
     )
 
 
@@ -109,7 +99,7 @@ def _spectrum(name: str, signal: Array, rate: float) -> Curve:
     frequency, amplitude = amplitude_spectrum(signal, rate)
     below = frequency < HIGHEST_HZ
     x, y = (np.asarray(each[below], np.float64) for each in (frequency, amplitude))
-    return Curve(label=name, x=x, y=y)
+    return Curve(name, x, y)
 
 
 PAPER = Paper(

@@ -60,28 +60,21 @@ def sliding() -> PaperFigure:
     path = case().path
     speed = path.sliding * _speed() * 1e3
     panel = Panel(
-        title="sliding at the contact",
-        x_label=PRESSURE_ANGLE,
-        y_label="sliding speed, mm/s",
-        curves=(Curve(label="ours", x=path.pressure_angle[0], y=speed),),
+        "sliding at the contact",
+        PRESSURE_ANGLE,
+        "sliding speed, mm/s",
+        [Curve("ours", path.pressure_angle[0], speed)],
     )
-    return PaperFigure(title="Sliding speed (figure 5)", panels=(panel,), reason=SHORT)
+    return PaperFigure("Sliding speed (figure 5)", [panel], SHORT)
 
 
 def pressure() -> PaperFigure:
     """Figure 6: contact pressure over the pressure angle."""
     new = case().new_flanks()
     found = case().pressure(case().line_load(new), new).max(axis=0) * 1e-6
-    curve = Curve(label="ours", x=case().path.pressure_angle[0], y=found)
-    panel = Panel(
-        title="new flanks",
-        x_label=PRESSURE_ANGLE,
-        y_label="pressure, MPa",
-        curves=(curve,),
-    )
-    return PaperFigure(
-        title="Contact pressure (figure 6)", panels=(panel,), reason=SHORT
-    )
+    curve = Curve("ours", case().path.pressure_angle[0], found)
+    panel = Panel("new flanks", PRESSURE_ANGLE, "pressure, MPa", [curve])
+    return PaperFigure("Contact pressure (figure 6)", [panel], SHORT)
 
 
 def radius() -> PaperFigure:
@@ -98,19 +91,14 @@ def radius() -> PaperFigure:
     inner = slice(INNER, -INNER)
     angle = case().path.pressure_angle[0][inner]
     curves = tuple(
-        Curve(label=label, x=angle, y=radii[kind][0][inner] * 1e3)
+        Curve(label, angle, radii[kind][0][inner] * 1e3)
         for label, kind in names.items()
     )
-    panel = Panel(
-        title="pinion",
-        x_label=PRESSURE_ANGLE,
-        y_label="curvature radius, mm",
-        curves=curves,
-    )
+    panel = Panel("pinion", PRESSURE_ANGLE, "curvature radius, mm", curves)
     return PaperFigure(
-        title="Curvature radius after wear (figure 7)",
-        panels=(panel,),
-        reason="Eq. (22) takes half the depth off the radius, a shift and no curvature. The "
+        "Curvature radius after wear (figure 7)",
+        [panel],
+        "Eq. (22) takes half the depth off the radius, a shift and no curvature. The "
         "profile that wear leaves is flatter in places and more curved in others.",
     )
 
@@ -119,20 +107,13 @@ def lives() -> PaperFigure:
     """Figure 10: life over torque and speed."""
     found = life_map(case(), TORQUES.tolist(), FEW_SPEEDS).hours
     curves = tuple(
-        Curve(label=f"{speed:g} rad/s", x=TORQUES, y=hours)
+        Curve(f"{speed:g} rad/s", TORQUES, hours)
         for speed, hours in zip(FEW_SPEEDS, found.T, strict=True)
     )
     panel = Panel(
-        title="life to 100 um, the paper's conventions",
-        x_label="torque, N m",
-        y_label="life, h",
-        curves=curves,
+        "life to 100 um, the paper's conventions", "torque, N m", "life, h", curves
     )
-    return PaperFigure(
-        title="Wear life over torque and speed (figure 10)",
-        panels=(panel,),
-        reason=FITS,
-    )
+    return PaperFigure("Wear life over torque and speed (figure 10)", [panel], FITS)
 
 
 def life_over_torque() -> PaperFigure:
@@ -160,18 +141,16 @@ def _life_figure(
     number: str,
 ) -> PaperFigure:
     panel = Panel(
-        title="life to 100 um",
-        x_label=x_label,
-        y_label="life, h",
-        curves=(
-            Curve(label="ours, the paper's conventions", x=x, y=lives),
-            Curve(label=f"printed fit, {equation}", x=x, y=printed, is_printed=True),
+        "life to 100 um",
+        x_label,
+        "life, h",
+        (
+            Curve("ours, the paper's conventions", x, lives),
+            Curve(f"printed fit, {equation}", x, printed, is_printed=True),
         ),
     )
     return PaperFigure(
-        title=f"Wear life over {x_label.split(',')[0]} (figure {number})",
-        panels=(panel,),
-        reason=FITS,
+        f"Wear life over {x_label.split(',')[0]} (figure {number})", [panel], FITS
     )
 
 

@@ -30,10 +30,9 @@ from gensig.plan.draws import (
 )
 from gensig.plan.lives import snapshots
 from gensig.plan.unit_designs import UnitDesigns, check_designs, draw_designs
-from gensig.record.gear_columns import gear_columns
 from gensig.record.inputs import MISSING, InputReader, draw_start
 from gensig.record.options import TORQUE_KEY, PlanOptions
-from gensig.record.simulate import signal_shapes
+from gensig.record.simulate import gear_columns, signal_shapes
 from gensig.record.streams import Stream, stream
 from gensig.systems.base import Machine
 from gensig.systems.pair_machine import severity

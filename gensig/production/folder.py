@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +12,6 @@ from gensig.dataset.folder.closing import finalize
 from gensig.dataset.folder.failures import commonest, failure_reasons
 from gensig.dataset.folder.joining import joined_folder
 from gensig.dataset.folder.layout import (
-    MANIFEST,
     SHARDS,
     ConfigContent,
     Manifest,
@@ -22,7 +20,7 @@ from gensig.dataset.folder.layout import (
     shard_path,
 )
 from gensig.dataset.folder.manifest import record_shards
-from gensig.dataset.folder.quick_check import absences, size_problem
+from gensig.dataset.folder.quick_check import size_problem
 from gensig.dataset.folder.run_log import log
 from gensig.dataset.plan import Plan
 from gensig.dataset.schema import SAMPLE_TYPES
@@ -33,16 +31,11 @@ from gensig.dataset.storage.receipts import (
     receipt_path,
     shard_entries,
 )
-from gensig.errors import ConfigError, SimulationError
-from gensig.execution.base import Executor, ShardFailure, read_n_workers
-from gensig.execution.local import LocalExecutor
-from gensig.execution.registry import read_executor
+from gensig.errors import ConfigError
+from gensig.execution.base import Executor, ShardFailure
 from gensig.options.configuration import Configuration
-from gensig.options.typed_only import refuse_untyped
-from gensig.plan.doubts import plan_doubts
 from gensig.plan.make import make_plan
-from gensig.plan.request import Request, read_request
-from gensig.production.record_counts import RecordCounts, record_counts
+from gensig.production.record_counts import RecordCounts
 from gensig.production.restoring import restore_index, restore_tables
 from gensig.production.run_check import (
     folder_kept,
@@ -52,7 +45,7 @@ from gensig.production.run_check import (
 )
 from gensig.production.shard_writing import write_shard
 from gensig.record.inputs import InputReader
-from gensig.terminal.run_progress import Progress, RunProgress
+from gensig.terminal.run_progress import Progress
 from gensig.version import __version__
 
 
@@ -310,48 +303,3 @@ def close_folder(out: Path) -> int:
         collect_receipts(out)
         _close(out)
     return read_manifest(out).n_failed
-
-
-def make_folder(
-    overrides: Sequence[str],
-    out: Path,
-    *,
-    config_dir: str | Path | None,
-    workers: int | None,
-    progress: bool,
-    reuse: bool,
-) -> None:
-    """Make a data set, or finish the same one with ``reuse``; see ``gensig.generate``."""
-    request = read_request(overrides, config_dir=config_dir)
-    executor = _executor(request, workers)
-    if reuse and (out / MANIFEST).is_file():
-        joined_folder(out, asked=request.config.with_entries(out=None).plain())
-    else:
-        plan = begin_folder(request.config, request.overrides, out)
-        for text in plan_doubts(InputReader(request.config), plan):
-            warnings.warn(text, stacklevel=3)
-    manifest = read_manifest(out)
-    if manifest.is_complete and not absences(out, manifest):
-        return
-    with record_counts(len(manifest.shards)) as counts:
-        shown = RunProgress(
-            quiet=not progress, n_records=manifest.n_records, counts=counts
-        )
-        with shown:
-            _, problems = run_folder(
-                out, executor=executor, on_shard=shown, counts=counts
-            )
-    if problems:
-        raise SimulationError(f"{out} is incomplete: {problems[0]}")
-
-
-def _executor(request: Request, workers: int | None) -> Executor:
-    refuse_untyped(request.config.with_entries(out=None), request.overrides)
-    if workers is not None:
-        return LocalExecutor(n_workers=read_n_workers(workers))
-    executor = read_executor(request.config["executor"])
-    if not executor.closes:
-        raise ConfigError(
-            "a task of an array job makes its share of a folder only; run it as `gensig generate`"
-        )
-    return executor

@@ -31,10 +31,9 @@ from gensig.dynamics.integrator import records_together
 from gensig.errors import DatasetError
 from gensig.options.configuration import Configuration
 from gensig.production.record_counts import RecordCounts
-from gensig.record.gear_columns import gear_columns
 from gensig.record.inputs import InputReader
 from gensig.record.options import DatasetOptions
-from gensig.record.simulate import finished_records, signal_shapes
+from gensig.record.simulate import finished_records, gear_columns, signal_shapes
 from gensig.systems.base import Machine
 from gensig.units import channel_unit
 from gensig.version import __version__

@@ -92,11 +92,6 @@ class Choice:
         """Records shown, twins not counted."""
         return sum(not shown.is_twin for shown in self.all_shown)
 
-    @property
-    def n_signals(self) -> int:
-        """Records and twins times channels."""
-        return len(self.channels) * sum(1 for _ in self.all_shown)
-
 
 def choose(data: Dataset, per_class: int | None) -> Choice:
     """Whole conditions, from the least to the greatest mean severity of their faults.

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from gensig.dataset.cards.class_figures import first_channel
+from gensig.dataset.cards.facts import channel_units
 from gensig.dataset.cards.origin import origin_of
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.dataset.storage.atomic import write_bytes
@@ -33,7 +35,7 @@ from gensig.report.signal_section import (
     severity_section,
     signals_section,
 )
-from gensig.report.signal_views import first_channel, opening_view, signal_views
+from gensig.report.signal_views import opening_view, signal_views
 from gensig.report.values import (
     ALONG,
     INDICATORS,
@@ -122,12 +124,12 @@ def report_text(
     chosen = choose(data, per_class)
     rotation = read_rotation(data)
     on_begin(min(data.n_records, MOST_MEASURED))
-    units = dict(zip(data.channel_names, tables.channel_units(data), strict=True))
-    channel_units = [units[name] for name in chosen.channels]
+    of_channels = channel_units(data)
+    units = [of_channels[name] for name in chosen.channels]
     drawn = some_records(data, MOST_ROWS)
     measured = measure(data, rotation, chosen.channels, _further)
-    compared = compare_with_measurements(data, measured, channel_units)
-    content = _content(data, chosen, rotation, channel_units, drawn, measured, compared)
+    compared = compare_with_measurements(data, measured, units)
+    content = _content(data, chosen, rotation, units, drawn, measured, compared)
     sections = [
         signals_section(
             data, chosen, rotation, content["examples"], content["opening"]
@@ -139,9 +141,9 @@ def report_text(
     if "lives" in content:
         sections.append(_lives(content["lives"]))
     sections += [
-        _indicators(data, chosen, measured, content["measured"], channel_units),
+        _indicators(data, chosen, measured, content["measured"], units),
         _parameters(data, content["drawn"]),
-        tables.comparisons(compared, channel_units),
+        tables.comparisons(compared, units),
         *tables.contents(data),
         tables.splits(data),
         *tables.loading(data),
@@ -178,8 +180,8 @@ def _content(
     """Data that the script of the page draws."""
     along = [name for name in ALONG if name in data.column_names]
     table = value_table(data, measured.records, along)
-    for name, values in measured.values.items():
-        table["columns"][name] = pack_floats(values)
+    for name, _ in INDICATORS:
+        table["columns"][name] = pack_floats(measured.values[name])
     channels = zip(chosen.channels, units, strict=True)
     examples = signal_views(data, chosen, rotation)
     first = first_channel(chosen.channels)

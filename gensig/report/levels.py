@@ -72,7 +72,7 @@ def class_levels(
 ) -> list[Level]:
     """Medians of each class and accelerometer; empty where no acceleration is in m/s^2."""
     label = data.column("label_name")[measured.records]
-    rms, velocity = measured.values["rms"], measured.further.get(VELOCITY)
+    rms, velocity = measured.values["rms"], measured.values.get(VELOCITY)
     if velocity is None:
         return []
     return [

@@ -47,7 +47,7 @@ def compare_with_measurements(
     shown = [number for number, unit in enumerate(units) if unit == "m/s^2"]
     if not shown or not measured.records.size:
         return []
-    values = {name: of[:, shown] for name, of in measured.further.items()}
+    values = {name: of[:, shown] for name, of in measured.values.items()}
     label = data.column("label_name")[measured.records]
     result: dict[RangeKey, FloatArray] = {}
     for name in data.class_names:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from gensig.dataset.cards.class_figures import first_channel
 from gensig.dataset.reader import Dataset
 from gensig.report.conditions import Choice
 from gensig.report.examples import envelope_band
 from gensig.report.rotation_frequencies import Rotation
-from gensig.report.signal_views import first_channel
 from gensig.report.sound import SOUND_RATE, SOUND_SECONDS
 from gensig.report.turns import FINE_TEETH
 from gensig.text.escaping import plain

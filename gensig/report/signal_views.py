@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dataset.cards.class_figures import FIRST_CHOICE
+from gensig.dataset.cards.class_figures import first_channel
 from gensig.dataset.reader import Dataset
 from gensig.report.conditions import Choice, Condition, HealthyKind, Shown
 from gensig.report.examples import example, read_signals
@@ -52,13 +52,6 @@ class _Read:
     views: list[dict[str, Any]]
     parts: list[FloatArray]
     turns: dict[str, list[Turn | None]]
-
-
-def first_channel(channels: Sequence[str]) -> int:
-    """Number of the channel shown first: that of the data card's figures, else the first."""
-    if FIRST_CHOICE in channels:
-        return list(channels).index(FIRST_CHOICE)
-    return 0
 
 
 def signal_views(

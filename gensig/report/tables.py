@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
 
 from gensig.dataset.cards.card import caveats_of
 from gensig.dataset.cards.facts import (
+    channel_units,
+    class_examples,
     geometry_facts,
     rounded,
     running_facts,
@@ -40,13 +41,6 @@ IN_WORDS = {
 }
 
 
-def channel_units(data: Dataset) -> list[str]:
-    """Unit of each channel, m/s^2 where the data set does not say."""
-    units = data.attributes.get("channel_units", [])
-    pairs = zip_longest(data.channel_names, units, fillvalue="m/s^2")
-    return [str(unit) for _, unit in pairs][: len(data.channel_names)]
-
-
 def contents(data: Dataset) -> list[Section]:
     """Facts of the data set, and its classes."""
     n_failed = int(np.count_nonzero(~data.usable))
@@ -57,8 +51,9 @@ def contents(data: Dataset) -> list[Section]:
         records += f", of which {n_failed} failed and are left out here"
     duration = data.n_samples / data.sampling_rate
     sampling = f"{data.n_samples} samples at {data.sampling_rate:g} Hz"
-    channels = zip(data.channel_names, channel_units(data), strict=True)
-    units = [f"{plain(name)} ({plain(unit)})" for name, unit in channels]
+    units = [
+        f"{plain(name)} ({plain(unit)})" for name, unit in channel_units(data).items()
+    ]
     further = [name for name in data.signal_names if name != "acceleration"]
     rows = [
         ("records", records),
@@ -82,20 +77,15 @@ def contents(data: Dataset) -> list[Section]:
 
 
 def _classes(data: Dataset) -> Table:
-    is_example = ~data.is_reference
-    label = data.column("label_name")[is_example]
-    unit = data.column("unit_id")[is_example]
-    all_severities = data.column("severity")[is_example]
-    order = [*data.class_names, *sorted(set(label.tolist()) - set(data.class_names))]
+    unit, severities = data.column("unit_id"), data.column("severity")
     rows = []
-    for name in order:
-        is_class = label == name
-        severity, median = all_severities[is_class], "none"
+    for name, mine in class_examples(data).items():
+        severity, median = severities[mine], "none"
         if np.isfinite(severity).any():
             median = f"{np.nanmedian(severity):.3g}"
-        n_units = len(np.unique(unit[is_class]))
+        n_units = len(np.unique(unit[mine]))
         spread = value_range(severity, "")
-        rows.append((plain(name), f"{is_class.sum()}", f"{n_units}", spread, median))
+        rows.append((plain(name), mine.sum(), n_units, spread, median))
     return Table(
         head=("class", "records", "machines", "severity", "its median"), rows=rows
     )
@@ -241,7 +231,7 @@ def loading(data: Dataset) -> list[Section]:
     """Code that reads this set, and its caveats."""
     faulty = [name for name in data.class_names if name != "healthy"]
     name = [*faulty, *data.class_names][0]
-    units = ", ".join(dict.fromkeys(channel_units(data)))
+    units = ", ".join(dict.fromkeys(channel_units(data).values()))
     protocols = data.protocols
     code = [
         "import gensig",

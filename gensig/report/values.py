@@ -63,14 +63,13 @@ class Measured:
 
     Parameters
     ----------
-    records : (row,)                            numbers in the data set
-    values : by indicator, (row, channel)       NaN where a record cannot tell it
-    further : other values of each record's signals, (row, channel)
+    records : (row,)                        numbers in the data set
+    values : (row, channel) by name         `INDICATORS` and further ones; NaN where a record
+                                            cannot tell it
     """
 
     records: NDArray[np.intp]
     values: dict[str, FloatArray]
-    further: dict[str, FloatArray]
 
 
 def some_records(data: Dataset, most: int) -> NDArray[np.intp]:
@@ -138,15 +137,9 @@ def measure(
     """
     records = some_records(data, MOST_MEASURED)
     rows = list(_rows(data, rotation, channels, records, further))
-    values: dict[str, FloatArray] = {name: np.array([]) for name, _ in INDICATORS}
-    others: dict[str, FloatArray] = {}
-    for name in dict.fromkeys(chain.from_iterable(rows)):
-        column = np.array([row[name] for row in rows])
-        if name in values:
-            values[name] = column
-        else:
-            others[name] = column
-    return Measured(records=records, values=values, further=others)
+    names = dict.fromkeys([*dict(INDICATORS), *chain.from_iterable(rows)])
+    values = {name: np.array([row[name] for row in rows]) for name in names}
+    return Measured(records=records, values=values)
 
 
 def _rows(

@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.sensing.dropped import FILLS
 from gensig.sensing.transfer_path import SETTLED
 from gensig.units import check_choice, check_limits, check_positive, unit
-
-Array = NDArray[np.float64]
 
 LONGEST_LOW = 0.1  # s
 GROUP = "sensing.sensor."

@@ -12,12 +12,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Flags
 from gensig.dynamics.decimation import usable_band
 from gensig.signals.indicators import crest_factor, kurtosis, rms
-
-Array = NDArray[np.float64]
 
 THIRD_OCTAVE_DB = 0.5
 INDICATORS = 0.05
@@ -39,7 +37,7 @@ class Agreement:
     indicators: Array
 
     @property
-    def agrees(self) -> NDArray[np.bool_]:
+    def agrees(self) -> Flags:
         """True where both lie within their limits, (lane,)."""
         return np.asarray(
             (self.third_octave_db <= THIRD_OCTAVE_DB) & (self.indicators <= INDICATORS)

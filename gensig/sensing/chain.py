@@ -8,8 +8,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError
 from gensig.sensing.accelerometer import Accelerometer
@@ -28,8 +28,6 @@ from gensig.units import (
     is_turning,
     unit,
 )
-
-Array = NDArray[np.float64]
 
 SNR_REFERENCES = ("healthy_twin", "record")
 LONGEST_LEAD = 0.5  # s

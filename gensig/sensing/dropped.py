@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gensig.arrays import Array, Flags
 
 FILLS = ("hold", "zero")
 
 
 def draw_dropped(
     rng: np.random.Generator, share: float, n_run: int, n_samples: int
-) -> NDArray[np.bool_]:
+) -> Flags:
     """Mask of lost samples, (sample,).
 
     Samples travel in packets of ``n_run``. Each packet is lost with probability ``share``,
@@ -23,7 +22,7 @@ def draw_dropped(
     return np.repeat(lost, n_run)[begun : begun + n_samples]
 
 
-def filled(signal: Array, dropped: NDArray[np.bool_], fill: str) -> Array:
+def filled(signal: Array, dropped: Flags, fill: str) -> Array:
     """Signal, (sensor, sample), with its losses filled.
 
     ``hold`` repeats the last sample that came; before the first one it takes that one. ``zero``

@@ -6,11 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.units import check_limits, unit
-
-Array = NDArray[np.float64]
 
 MOST_LINES = 100_000
 MOST_ECCENTRICITY = math.radians(5.0)

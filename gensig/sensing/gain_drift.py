@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gensig.arrays import Array
 
 # in a correlation time; between them the logarithm is straight: 2.4 % less variance midway
 POINTS_PER_TIME = 20

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.sensing.accelerometer import SensorSet, draw_sensors
 from gensig.sensing.chain import (
     LONGEST_LEAD,
@@ -22,8 +22,6 @@ from gensig.sensing.gain_drift import draw_drift
 from gensig.sensing.measured_path import ImpulseResponses
 from gensig.sensing.noise_parts import band_power
 from gensig.sensing.transfer_path import Housing, ModalPath, draw_housing
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.faults.base import ALL
 from gensig.faults.flank_form import FlankForm, Misalignment, ProfileError
@@ -27,8 +27,6 @@ from gensig.sensing.gear_tolerances import (
     single_pitch_limit,
 )
 from gensig.units import check_limits, from_si, unit
-
-Array = NDArray[np.float64]
 
 # most waves of the form deviation from end to end; whole ones have no slope
 FORM_WAVES = 3

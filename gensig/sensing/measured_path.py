@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Complex
 from gensig.dynamics.decimation import LOWEST_HZ, usable_band
 from gensig.errors import ConfigError
 from gensig.text.user_file import check_columns, check_rate, read_table
-
-Array = NDArray[np.float64]
 
 KEY = "sensing.path.file"
 LEAST_ROWS = 16
@@ -96,7 +94,7 @@ def read_responses(
 
 
 def _impulse_responses(
-    file: str, frequency: Array, response: NDArray[np.complex128], sampling_rate: float
+    file: str, frequency: Array, response: Complex, sampling_rate: float
 ) -> Array:
     """Causal impulse responses of frequency responses, (pair, line) to (pair, sample).
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.sensing.noise_parts import (
     Background,
@@ -28,8 +28,6 @@ from gensig.sensing.noise_parts import (
 )
 from gensig.signals.recording import STANDARD_GRAVITY
 from gensig.units import is_number, read_kind
-
-Array = NDArray[np.float64]
 
 PARTS: dict[str, type[Part]] = {
     "white": White,

@@ -10,16 +10,14 @@ from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError
 from gensig.sensing.tones import Limits
 from gensig.sensing.transfer_path import SETTLED, mode_section
 from gensig.text.user_file import check_columns, check_rate, read_table
 from gensig.units import check_limits, check_positive, unit
-
-Array = NDArray[np.float64]
 
 BLOCK = 256  # samples
 # assumed; amplitude of the first pair of sidebands of another machine's tones, over the tone's

@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.units import check_limits, from_si, unit
-
-Array = NDArray[np.float64]
 
 MOST_PULSES = 1000  # a turn
 # standard deviations that fit into a pulse or a gap, so that no edge overtakes another

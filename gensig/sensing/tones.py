@@ -8,13 +8,10 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Complex, Integers
 from gensig.dynamics.response import LinearMachine
 from gensig.units import check_limits, check_ranges
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 TURN = 2.0 * math.pi
 Limits = dict[str, tuple[float, float]]
@@ -34,7 +31,7 @@ class Tones:
 
     gear: str
     base: Array
-    multiple: NDArray[np.int64]
+    multiple: Integers
     force: Complex
     follows: str
 

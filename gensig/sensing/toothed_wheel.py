@@ -11,13 +11,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import SimulationError
 from gensig.sensing.encoder import MOST_ECCENTRICITY, MOST_LINE_SHARE, Disc, draw_lines
 from gensig.units import check_limits, unit
-
-Array = NDArray[np.float64]
 
 MOST_TEETH = 1000
 SLOWEST_CLOCK, FASTEST_CLOCK = 1e4, 1e12  # Hz

@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.units import check_limits, check_positive, check_ranges, unit
-
-Array = NDArray[np.float64]
 
 GROUP = "sensing.path."
 MOST_MODES = 200

@@ -15,7 +15,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.signals.separation import FloatArray, GearTurns
+from gensig.arrays import FloatArray
+from gensig.signals.separation import GearTurns
 
 SpectrumArray = NDArray[np.complexfloating]
 

@@ -11,9 +11,9 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.floating]
+from gensig.arrays import FloatArray
 
 # an average of fewer turns holds more than 1/20 of the power of what does not repeat
 MIN_TURNS = 20

@@ -8,11 +8,10 @@ Systems and Signal Processing 25 (2), 485-520.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gensig.arrays import FloatArray
 from gensig.signals.spectrum import amplitude_spectrum
-
-FloatArray = NDArray[np.floating]
 
 
 def band_pass(

@@ -9,13 +9,12 @@ fatigue data", NASA TM-106467 (NB4).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gensig.arrays import FloatArray
 from gensig.signals.averaging import residual_signal
 from gensig.signals.envelope import mesh_envelope
 from gensig.signals.indicators import ROUNDING, rms
-
-FloatArray = NDArray[np.floating]
 
 
 def na4(averages: ArrayLike, n_teeth: int) -> FloatArray:

@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gensig.arrays import FloatArray
 from gensig.signals.envelope import envelope
 from gensig.signals.indicators import rms
-
-FloatArray = NDArray[np.floating]
 
 # median of the envelope of Gaussian noise of deviation 1
 RAYLEIGH_MEDIAN = math.sqrt(2.0 * math.log(2.0))

@@ -7,12 +7,11 @@ are NaN where it is NaN: of too few turns.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gensig.arrays import FloatArray
 from gensig.signals.averaging import difference_signal, regular_signal
 from gensig.signals.synchronous import mesh_harmonics
-
-FloatArray = NDArray[np.floating]
 
 # of the average's RMS: what is left of a transform forth and back where nothing is
 ROUNDING = 1e-12

@@ -14,10 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError, TooShortError
 from gensig.signals.recording import Recording
-
-Array = NDArray[np.float64]
 
 SEARCH = 0.03  # the mesh frequency is looked for this far from the stated one, relative
 MOST_HARMONICS = 10

@@ -12,14 +12,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.signals.reading.reader_process import limits_for, read_apart
 from gensig.signals.reading.recording_files import LEAST_SAMPLES, Content
 from gensig.text.user_file import check_rate, open_given
-
-Array = NDArray[np.float64]
 
 STANDARD_GRAVITY = 9.80665  # m/s2
 UNITS = {"m/s2": 1.0, "g": STANDARD_GRAVITY}

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gensig.arrays import FloatArray
 from gensig.errors import ConfigError
-
-FloatArray = NDArray[np.floating]
 
 # of the lower rate, as in gensig.dynamics.decimation: recorders of 2.56 samples a cycle
 PASS_SHARE = 0.390625

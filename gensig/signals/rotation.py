@@ -10,11 +10,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gensig.arrays import FloatArray
 from gensig.signals.averaging import interpolate, samples_per_turn_for
-
-FloatArray = NDArray[np.floating]
 
 PADDING = 8  # bins of the searched spectrum for one of the record's
 # of the median amplitude; band-limited noise is below it for 3 % of the time

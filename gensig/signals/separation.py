@@ -9,11 +9,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gensig.arrays import FloatArray
 from gensig.signals.averaging import interpolate
-
-FloatArray = NDArray[np.floating]
 
 # of one passage of a tooth: decides only about teeth that pass too seldom to be separated
 RIDGE = 1e-3

@@ -7,9 +7,9 @@ signals", Mechanical Systems and Signal Processing 20 (2), 282-307.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.floating]
+from gensig.arrays import FloatArray
 
 MAIN_LOBE = 2  # lines from the middle of a Hann window's main lobe to its first zero
 

@@ -12,11 +12,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gensig.arrays import FloatArray
 from gensig.errors import ConfigError, TooShortError
 from gensig.signals.mesh_motion import SEARCH, Teeth, find_motion, in_hertz
 from gensig.signals.recording import Recording
-
-FloatArray = NDArray[np.floating]
 
 # of the faster gear: its sidebands, one turn away, are resolved from the mesh
 TURNS_A_FRAME = 3

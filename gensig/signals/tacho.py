@@ -7,11 +7,10 @@ Signal Processing 11 (2), 187-205.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gensig.arrays import FloatArray
 from gensig.signals.averaging import interpolate, samples_per_turn_for
-
-FloatArray = NDArray[np.floating]
 
 
 def pulse_times(tacho: ArrayLike, sampling_rate: float) -> FloatArray:

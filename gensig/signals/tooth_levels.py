@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gensig.arrays import FloatArray
 from gensig.signals.averaging import resample_to_angle
 from gensig.signals.envelope import band_pass
-
-FloatArray = NDArray[np.floating]
 
 # standard deviation of a normal variable over the median of its magnitude
 NORMAL = 1.4826

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gensig.signals.separation import FloatArray
+from gensig.arrays import FloatArray
 
 NEAREST = 1  # teeth on either side that do not count as sisters: they share the contact
 # Of the mean square of a sample; 0.01 to 0.1 score alike in cross-validation.

@@ -15,9 +15,13 @@ from gensig.faults.crack import Crack
 from gensig.faults.pitting import DistributedPitting
 from gensig.geometry.contact import GearPair
 from gensig.life.crack_growth import CrackGrowth, CrackGrowthOptions, crack_growth
-from gensig.life.pit_growth import PitGrowth, PitGrowthOptions, pit_growth
+from gensig.life.pit_growth import (
+    PitGrowth,
+    PitGrowthOptions,
+    pit_growth,
+    sliced_contact_stress,
+)
 from gensig.life.sliced_crack import sliced_crack_growth
-from gensig.life.sliced_stress import sliced_contact_stress
 from gensig.material import Material
 from gensig.systems.base import Machine
 from gensig.systems.sliced_pair import SlicedPair

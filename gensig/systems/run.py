@@ -63,13 +63,14 @@ def angle_from_tooth_0(
 class Run(Generic[MachineT_co]):
     """One record to be simulated.
 
-    None means a perfect specimen, a nominal gearbox, a start with teeth 0 at A.
+    Without faults its gears are healthy; None means a perfect specimen, a nominal gearbox, a start
+    with teeth 0 at A.
     ``with_mesh_state`` asks for the loads of the teeth at every sample.
     ``discs`` are the toothed wheels of a drive line.
     """
 
     system: MachineT_co
-    faults: tuple[Fault, ...]
+    faults: tuple[Fault, ...] = ()
     start: Start | None = None
     specimen: Specimen | None = None
     gearbox: Gearbox | None = None

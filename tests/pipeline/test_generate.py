@@ -10,7 +10,7 @@ import gensig.errors
 from gensig.cli import main
 from gensig.dataset.folder.layout import read_manifest
 from gensig.dataset.folder.verify import verify
-from gensig.production import folder as production
+from gensig.production import making
 
 SMALL = (
     "plan.n_records=8",
@@ -128,7 +128,7 @@ def test_python_warns_of_a_plan_without_sense(tmp_path):
 
 
 def test_a_warning_names_the_line_that_called(tmp_path, monkeypatch):
-    monkeypatch.setattr(production, "plan_doubts", lambda *_: ["a doubt"])
+    monkeypatch.setattr(making, "plan_doubts", lambda *_: ["a doubt"])
     with pytest.warns(UserWarning, match="^a doubt$") as warned:
         gensig.generate(*SMALL, out=tmp_path / "data", progress=False).close()
     assert [warning.filename for warning in warned] == [__file__]

@@ -35,23 +35,7 @@ def damper_figure(
     speeds: NDArray[np.float64],
 ) -> Figure:
     """The largest tooth force, its cycle and orders, and root stress, before and after."""
-    by_speed: list[Mark] = []
-    by_angle, by_order, stress = [], [], []
-    for name, state in states.items():
-        look = LOOKS[name]
-        by_speed.append(curve(RPM * speeds, state.largest / 1e3, name, *look))
-        force, root = state.load.force, state.root
-        angle = np.linspace(0.0, 720.0, len(force), endpoint=False)
-        by_angle.append(curve(angle, force / 1e3, name, *look))
-        _, amplitudes = state.response.element_forces(state.line.linear()[1])
-        order_force = np.abs(amplitudes[mesh]) / 1e3
-        by_order.append(curve(state.response.orders, order_force, name, *look))
-        roll, constant = roll_degrees(root), root.history.stress[root.strength.decisive]
-        label = f"{name}: greatest force all the way"
-        stress += [
-            curve(roll, heaviest_pass(root) * 1e-6, name, *look),
-            curve(roll, constant * 1e-6, label, look[0], ":", 0.8),
-        ]
+    by_speed, by_angle, by_order, stress = _curves(states, mesh, RPM * speeds)
     first = states["before"]
     at_speed = f"at {RPM * first.load.speed:g} r/min"
     upper = [
@@ -99,3 +83,27 @@ def damper_figure(
     )
     name = f"{first.line.drive.name}, mesh {first.line.mesh_names[mesh]}"
     return Figure([upper, lower], (12, 7.6), f"{name}\n{sizes}")
+
+
+def _curves(
+    states: Mapping[str, DamperState], mesh: int, rpm: NDArray[np.float64]
+) -> tuple[list[Mark], ...]:
+    """Curves of both states on each of the four panels."""
+    by_speed: list[Mark] = []
+    by_angle, by_order, stress = [], [], []
+    for name, state in states.items():
+        look = LOOKS[name]
+        by_speed.append(curve(rpm, state.largest / 1e3, name, *look))
+        force, root = state.load.force, state.root
+        angle = np.linspace(0.0, 720.0, len(force), endpoint=False)
+        by_angle.append(curve(angle, force / 1e3, name, *look))
+        _, amplitudes = state.response.element_forces(state.line.linear()[1])
+        order_force = np.abs(amplitudes[mesh]) / 1e3
+        by_order.append(curve(state.response.orders, order_force, name, *look))
+        roll, constant = roll_degrees(root), root.history.stress[root.strength.decisive]
+        label = f"{name}: greatest force all the way"
+        stress += [
+            curve(roll, heaviest_pass(root) * 1e-6, name, *look),
+            curve(roll, constant * 1e-6, label, look[0], ":", 0.8),
+        ]
+    return by_speed, by_angle, by_order, stress

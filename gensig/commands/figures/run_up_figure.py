@@ -31,14 +31,14 @@ MARGIN = 0.05  # of the height, that a figure leaves free
 def run_up_figure(run_up: RunUp, name: str) -> Figure:
     """Levels of one channel over speed; ``name`` is that of the record in the title."""
     rpm = RPM * run_up.orders.speed
-    order_map, waterfall = _order_map(run_up), _waterfall(run_up)
     cuts = _cuts(run_up)
+    key = _key(run_up, cuts)
     title = f"{name}: {run_up.channel}, {run_up.shaft} from {rpm[0]:.0f} to {rpm[-1]:.0f} r/min"
     return Figure(
-        [[order_map, waterfall, waterfall], [cuts, cuts, _key(run_up, cuts)]],
+        [[_order_map(run_up), _waterfall(run_up), key], [cuts, cuts, key]],
         (13, 9),
         title,
-        ratios={"width_ratios": (3.1, 2.1, 1.0), "height_ratios": (1.25, 1.0)},
+        ratios={"width_ratios": (2.4, 2.4, 1.2), "height_ratios": (1.25, 1.0)},
     )
 
 

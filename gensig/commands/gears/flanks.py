@@ -28,7 +28,6 @@ from gensig.mesh.options import MOST_SLICES
 from gensig.options.configuration import Configuration
 from gensig.systems.registry import PairParts, read_sliced_pair
 from gensig.systems.sliced_pair import SlicedPair, TransmissionError
-from gensig.terminal.warning_lines import one_line_warnings
 
 TOLERATED = 0.01  # error of a pressure that is not told
 LOST_SHARE = 0.02  # of the bearing field; less is the edge of the reliefs
@@ -36,16 +35,15 @@ LOST_SHARE = 0.02  # of the bearing field; less is the edge of the reliefs
 LEAST_SHARE = 0.05
 
 
-@answered
+@answered()
 def transmission_error(config: Configuration, _: Namespace) -> Answer:
     """Static transmission error under load."""
-    with one_line_warnings("gensig"):
-        system, faults = read_sliced_pair(config), read_faults(config["fault"])
-        result = sound = system.transmission_error()
-        if faults:
-            result = system.transmission_error(faults)
-        _warn_of_lost_contact(system, sound)
-        pressure_error = system.pressure_error(sound)
+    system, faults = read_sliced_pair(config), read_faults(config["fault"])
+    result = sound = system.transmission_error()
+    if faults:
+        result = system.transmission_error(faults)
+    _warn_of_lost_contact(system, sound)
+    pressure_error = system.pressure_error(sound)
     content = transmission_error_content(system, result)
     content["max_contact_pressure_error"] = pressure_error
     if faults:
@@ -124,14 +122,13 @@ def transmission_error_content(
 def sliced_stiffness(parts: PairParts, fault: Mapping[str, Any]) -> Answer:
     """``gensig stiffness`` of a pair cut into slices."""
     faulty = None
-    with one_line_warnings("gensig"):
-        system, faults = parts.flanks, read_faults(fault)
-        result = sound = system.transmission_error()
-        position, single = system.single_pair()
-        if faults:
-            result = system.transmission_error(faults)
-            faulty = system.faulty_pair(faults, position)
-        hot = heat_report(parts.duty)
+    system, faults = parts.flanks, read_faults(fault)
+    result = sound = system.transmission_error()
+    position, single = system.single_pair()
+    if faults:
+        result = system.transmission_error(faults)
+        faulty = system.faulty_pair(faults, position)
+    hot = heat_report(parts.duty)
     pair, contact = system.pair, result.contact
     stiffness = contact.stiffness
     content = {

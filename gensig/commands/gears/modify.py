@@ -17,7 +17,6 @@ from gensig.options.configuration import Configuration
 from gensig.systems.flank_optimum import Cases, Optimum, judge, optimise
 from gensig.systems.registry import PairParts
 from gensig.systems.sliced_pair import SlicedPair
-from gensig.terminal.warning_lines import one_line_warnings
 from gensig.units import from_si
 
 DIGITS = {"um": 3, "mm": 4}  # of the keys that are written: 1 nm and 0.1 um
@@ -31,23 +30,22 @@ def modify_flank(config: Configuration, arguments: Namespace) -> Answer:
             f"--points {arguments.points}: give 1 for the least ripple alone, "
             "3 or more for a front"
         )
-    with one_line_warnings("gensig"):
-        system = sound_pair(PairParts(config), config["fault"])
-        given = system.modification.misalignment
-        misalignments = (given + value * 1e-6 for value in arguments.misalignments)
-        cases = Cases(
-            torques=tuple(arguments.torques or (system.torque,)),
-            misalignments=tuple(misalignments),
-        )
-        aligned = replace(system.modification, misalignment=0.0)
-        before = judge(system, aligned, cases)
-        front = optimise(
-            system,
-            cases,
-            n_front=arguments.points,
-            seed=arguments.seed,
-            on_done=lambda done, total: step(f"{done} of {total} points"),
-        )
+    system = sound_pair(PairParts(config), config["fault"])
+    given = system.modification.misalignment
+    misalignments = (given + value * 1e-6 for value in arguments.misalignments)
+    cases = Cases(
+        torques=tuple(arguments.torques or (system.torque,)),
+        misalignments=tuple(misalignments),
+    )
+    aligned = replace(system.modification, misalignment=0.0)
+    before = judge(system, aligned, cases)
+    front = optimise(
+        system,
+        cases,
+        n_front=arguments.points,
+        seed=arguments.seed,
+        on_done=lambda done, total: step(f"{done} of {total} points"),
+    )
     chosen = _knee(front, before)
     content = {
         "before": _content(before),

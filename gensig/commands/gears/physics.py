@@ -24,7 +24,7 @@ PAPER_KIND = "sum of pair stiffnesses (secant)"
 TANGENT_KIND = "tangent dF/d(approach) at static equilibrium"
 
 
-@answered
+@answered()
 def stiffness(config: Configuration, _: Namespace) -> Answer:
     """Mesh stiffness over the mesh of healthy and faulty teeth."""
     if config["system"].get("kind") == SLICED:

@@ -59,7 +59,7 @@ class Vibration:
         return Vibration(speed=speed, total=total, mesh=mesh)
 
 
-@answered
+@answered()
 def run_up(config: Configuration, arguments: Namespace) -> Answer | int:
     """The vibration of the variants over the speed, and its mean change."""
     configs = {FIRST: config}

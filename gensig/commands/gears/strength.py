@@ -53,7 +53,7 @@ ROWS = (
 )
 
 
-@answered
+@answered()
 def root_stress(config: Configuration, arguments: Namespace) -> Answer:
     """Root stress and safety factors."""
     if read_faults(config["fault"]):

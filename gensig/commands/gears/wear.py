@@ -32,7 +32,6 @@ from gensig.options.configuration import Configuration
 from gensig.record.inputs import InputReader
 from gensig.record.vibration_limit import WornVibration, limited_by_vibration
 from gensig.systems.wear import read_wear_case, wear_fault
-from gensig.terminal.warning_lines import one_line_warnings
 
 Array = NDArray[np.float64]
 
@@ -46,17 +45,16 @@ YIELD_SHARE = 0.6
 @answered(group="fault")
 def wear_life_verb(config: Configuration, arguments: Namespace) -> Answer:
     """Life and wear of a pair's flanks, and the worn flanks as an option."""
-    with one_line_warnings("gensig"):
-        case = read_wear_case(config)
-        speed = read_operating(config.section("operating")).speed
-        if case.pair.transverse_contact_ratio < 1.0:
-            _warn_of_interruption(case)
-        case, vibration = limited_by_vibration(case, InputReader(config))
-        life = wear_life(case)
-        if vibration is not None and vibration.limit_depth is not None:
-            life = replace(life, ended_by="vibration")
-        lives, laws = _lives(case, speed, arguments)
-        content = wear_life_content(life, speed, lives, laws, vibration)
+    case = read_wear_case(config)
+    speed = read_operating(config.section("operating")).speed
+    if case.pair.transverse_contact_ratio < 1.0:
+        _warn_of_interruption(case)
+    case, vibration = limited_by_vibration(case, InputReader(config))
+    life = wear_life(case)
+    if vibration is not None and vibration.limit_depth is not None:
+        life = replace(life, ended_by="vibration")
+    lives, laws = _lives(case, speed, arguments)
+    content = wear_life_content(life, speed, lives, laws, vibration)
     _warn_of_pressure(case, content)
     return Answer(
         content,

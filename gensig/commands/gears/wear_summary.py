@@ -51,7 +51,7 @@ def wear_lines(
 
 
 def _error_limit(content: Mapping[str, Any]) -> Iterator[str]:
-    """How near the transmission error came to a limit that did not end the life."""
+    """A line on the transmission error beside a limit that did not end the life."""
     limit = content["transmission_error_limit_um"]
     if limit is not None and content["ended_by"] != "transmission_error":
         error = content["history"]["transmission_error_peak_to_peak_um"][-1]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gensig.commands.lines.results import MPA, RPM, strength_content
+from gensig.commands.output import columns
 from gensig.driveline.engine_dampers import DynamicRootStress, passes_of_a_cycle
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.cycle_statistics import (
@@ -148,27 +149,27 @@ def time_lines(content: Mapping[str, Any]) -> Iterator[str]:
     """Summary of ``--time``."""
     residual = content["time_energy_residual"]
     yield f"in time, teeth free to part (energy residual {residual:.1g}):"
-    nodes = zip(
-        content["shown_nodes"],
-        content["time_typical_fluctuation_rpm"],
-        content["time_speed_fluctuation_rpm"],
-        content["time_mean_cycle_fluctuation_rpm"],
-        strict=True,
+    nodes = columns(
+        content,
+        "shown_nodes",
+        "time_typical_fluctuation_rpm",
+        "time_speed_fluctuation_rpm",
+        "time_mean_cycle_fluctuation_rpm",
     )
     for node, typical, whole, cycle in nodes:
         yield (
             f"  node {node:>3} +- {typical:.2f} r/min in a cycle, {whole:.2f} in all, "
             f"{cycle:.2f} of the mean cycle"
         )
-    meshes = zip(
-        content["meshes"],
-        content["time_typical_least_tooth_force_n"],
-        content["time_typical_greatest_tooth_force_n"],
-        content["time_least_tooth_force_n"],
-        content["time_greatest_tooth_force_n"],
-        content["time_contact_loss_fraction"],
-        content["time_back_contact_fraction"],
-        strict=True,
+    meshes = columns(
+        content,
+        "meshes",
+        "time_typical_least_tooth_force_n",
+        "time_typical_greatest_tooth_force_n",
+        "time_least_tooth_force_n",
+        "time_greatest_tooth_force_n",
+        "time_contact_loss_fraction",
+        "time_back_contact_fraction",
     )
     for name, least, greatest, low, high, apart, back in meshes:
         yield (

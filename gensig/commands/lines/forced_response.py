@@ -23,7 +23,7 @@ from gensig.commands.lines.engine_in_time import (
     time_lines,
 )
 from gensig.commands.lines.results import RPM, ResponseResult, spaced, speed_steps
-from gensig.commands.output import Answer, answered, plain
+from gensig.commands.output import Answer, answered, columns, plain
 from gensig.driveline.engine_dampers import (
     DynamicRootStress,
     dynamic_root_stress,
@@ -52,7 +52,7 @@ CYCLE_POINTS = 5760
 RUN_ORDERS = 80  # half orders of a run: up to order 40
 
 
-@answered
+@answered()
 def forced_response(config: Configuration, arguments: Namespace) -> Answer:
     """Speed fluctuation, spectra and tooth forces."""
     line = read_engine_line(config)
@@ -254,26 +254,16 @@ def _lines(content: dict[str, Any]) -> Iterator[str]:
         )
     else:
         yield f"{point} of the load at the motor"
-    nodes = zip(
-        content["node_numbers"],
-        content["nodes"],
-        content["mean_speed_rpm"],
-        content["speed_fluctuation_rpm"],
-        strict=True,
-    )
+    keys = "node_numbers", "nodes", "mean_speed_rpm", "speed_fluctuation_rpm"
+    nodes = columns(content, *keys)
     rows = {number: row for number, *row in nodes}
     for number in content["shown_nodes"]:
         name, mean, half = rows[number]
         yield f"  node {number:>3} {name:<34} {mean:8.1f} r/min +- {half:.2f}"
     for name, value in content["toothed_wheel_fluctuation_rpm"].items():
         yield f"  toothed wheel {name} shows +- {value:.2f} r/min"
-    forces = zip(
-        content["meshes"],
-        content["least_tooth_force_n"],
-        content["mean_tooth_force_n"],
-        content["greatest_tooth_force_n"],
-        strict=True,
-    )
+    ends = "least_tooth_force_n", "mean_tooth_force_n", "greatest_tooth_force_n"
+    forces = columns(content, "meshes", *ends)
     for name, low, mean, high in forces:
         line = f"  mesh {name:>6} {low:9.0f} .. {high:.0f} N, mean {mean:.0f} N"
         if min(low * mean, high * mean) < 0.0:

@@ -22,7 +22,7 @@ MOST_MOTIONS = 3  # of a mode in the summary
 LEAST_SHARE = 0.05  # of the kinetic energy of a motion in the summary
 
 
-@answered
+@answered()
 def modes(config: Configuration, _: Namespace) -> Answer:
     """Frequencies, damping, shapes and energy shares."""
     line = read_line(config)

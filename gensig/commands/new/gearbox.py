@@ -118,13 +118,13 @@ def option_texts(
 
 
 def pair_content(gearbox: Gearbox) -> dict[str, Any]:
-    """What follows from the sheet of a single pair."""
+    """Values that follow from the sheet of a single pair."""
     (stage,) = gearbox.stages
     return {"derived": stage.derived(), "bearings": stage.bearings()}
 
 
 def line_content(gearbox: Gearbox) -> dict[str, Any]:
-    """What follows from the sheet of several stages: of the whole, each stage and each shaft."""
+    """Values of several stages that follow: of the whole, of each stage and of each shaft."""
     sheet, last = gearbox.sheet, gearbox.slowdowns[-1]
     of_stages = [
         {**stage.derived(), "mesh_force_n": force}

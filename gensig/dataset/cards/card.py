@@ -8,7 +8,13 @@ import yaml
 
 from gensig.dataset.cards.class_figures import write_class_figures
 from gensig.dataset.cards.croissant import croissant_text
-from gensig.dataset.cards.facts import geometry_facts, running_facts, value_range
+from gensig.dataset.cards.facts import (
+    channel_units,
+    class_examples,
+    geometry_facts,
+    running_facts,
+    value_range,
+)
 from gensig.dataset.cards.origin import origin_of
 from gensig.dataset.folder.layout import CARD, CROISSANT, SHARDS
 from gensig.dataset.reader import Dataset, open_dataset
@@ -165,8 +171,7 @@ def yaml_block(content: Mapping[str, object]) -> str:
 
 def set_facts(data: Dataset) -> list[tuple[object, ...]]:
     """Rows of fact and value on all records of a data set."""
-    units = data.attributes.get("channel_units", ["m/s^2"] * len(data.channel_names))
-    pairs = zip(data.channel_names, units, strict=False)
+    units = channel_units(data).items()
     n_reference = int(np.count_nonzero(data.is_reference))
     records, n_failed = str(data.n_records), int(np.count_nonzero(~data.usable))
     if n_reference:
@@ -181,7 +186,7 @@ def set_facts(data: Dataset) -> list[tuple[object, ...]]:
         "records": records,
         "duration of a record": f"{seconds:g} s ({data.n_samples} samples)",
         "sampling rate": f"{data.sampling_rate:g} Hz",
-        "channels": ", ".join(f"{name} ({unit})" for name, unit in pairs),
+        "channels": ", ".join(f"{name} ({unit})" for name, unit in units),
     }
     facts |= geometry_facts(data) | running_facts(data)
     if data.sample_type == "int16":
@@ -197,14 +202,11 @@ def set_facts(data: Dataset) -> list[tuple[object, ...]]:
 
 def class_rows(data: Dataset) -> list[tuple[object, ...]]:
     """Rows of class, number of records and range of severity, without reference records."""
-    is_example = ~data.is_reference
-    names = data.column("label_name")[is_example]
-    severity = data.column("severity")[is_example]
-    order = [name for name in data.class_names if (names == name).any()]
-    order += sorted(set(names.tolist()) - set(order))
+    severity = data.column("severity")
     return [
-        (name, int((names == name).sum()), value_range(severity[names == name], ""))
-        for name in order
+        (name, int(mine.sum()), value_range(severity[mine], ""))
+        for name, mine in class_examples(data).items()
+        if mine.any()
     ]
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.dataset.cards.facts import channel_units
 from gensig.dataset.folder.layout import FIGURES
 from gensig.dataset.reader import Dataset
 from gensig.dataset.storage.atomic import cannot_write, write_bytes
@@ -55,10 +57,8 @@ def write_class_figures(data: Dataset) -> dict[str, str]:
         import matplotlib
     except ImportError:
         return {}
-    names = data.channel_names
-    channel = FIRST_CHOICE if FIRST_CHOICE in names else names[0]
-    units = dict(zip(names, data.attributes.get("channel_units", []), strict=False))
-    unit = units.get(channel, "m/s^2").replace("^2", "²")
+    channel = data.channel_names[first_channel(data.channel_names)]
+    unit = channel_units(data)[channel].replace("^2", "²")
     records = example_records(data)
     examples = {name: _example(data, records[name], channel) for name in records}
     if not examples:
@@ -81,6 +81,13 @@ def write_class_figures(data: Dataset) -> dict[str, str]:
             )
             write_bytes(data.folder / paths[name], picture)
     return paths
+
+
+def first_channel(channels: Sequence[str]) -> int:
+    """Number of the channel shown first."""
+    if FIRST_CHOICE in channels:
+        return list(channels).index(FIRST_CHOICE)
+    return 0
 
 
 def example_records(data: Dataset) -> dict[str, int]:

@@ -3,6 +3,7 @@
 from contextlib import suppress
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gensig.dataset.columns import GEAR_COLUMNS, GEAR_NAMES, GEAR_PINION_TURNS
 from gensig.dataset.reader import Dataset
@@ -20,6 +21,13 @@ def n_designs(data: Dataset) -> int:
         return 1
     designs = np.stack([data.column(name) for name in varied], axis=1)
     return len(np.unique(designs, axis=0))
+
+
+def channel_units(data: Dataset) -> dict[str, str]:
+    """Unit of each channel by its name, m/s^2 where the data set does not say."""
+    names = data.channel_names
+    told = zip(names, map(str, data.attributes.get("channel_units", [])), strict=False)
+    return {**dict.fromkeys(names, "m/s^2"), **dict(told)}
 
 
 def gear_turns(data: Dataset) -> dict[str, float]:
@@ -59,6 +67,16 @@ def geometry_facts(data: Dataset) -> dict[str, object]:
         elif name in data.attributes:
             facts[name] = rounded(data.attributes[name])
     return facts | gear_facts(data)
+
+
+def class_examples(data: Dataset) -> dict[str, NDArray[np.bool_]]:
+    """(record,) by class name: the records of each class that are no reference.
+
+    The classes of the data set stand first, in their order.
+    """
+    label, is_example = data.column("label_name"), ~data.is_reference
+    names = dict.fromkeys([*data.class_names, *np.unique(label[is_example]).tolist()])
+    return {name: is_example & (label == name) for name in names}
 
 
 def running_facts(data: Dataset) -> dict[str, object]:

@@ -11,12 +11,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.units import from_si, unit
-
-Array = NDArray[np.float64]
 
 FOLLOWERS = ("flat", "roller")
 

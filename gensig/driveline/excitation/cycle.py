@@ -12,12 +12,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.units import unit
-
-Array = NDArray[np.float64]
 
 CYCLE = 4.0 * math.pi  # rad, two turns
 

@@ -10,12 +10,10 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.excitation.cycle import CYCLE
 from gensig.errors import ConfigError
-
-Array = NDArray[np.float64]
 
 
 def whole_cycles(crank_angle: Array) -> list[slice]:

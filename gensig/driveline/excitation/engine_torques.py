@@ -11,8 +11,8 @@ from functools import partial
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.excitation.cams import Cam, cam_torque
 from gensig.driveline.excitation.cycle import (
     CYCLE,
@@ -41,8 +41,6 @@ from gensig.driveline.excitation.pressure import (
 )
 from gensig.errors import ConfigError
 from gensig.units import unit
-
-Array = NDArray[np.float64]
 
 CAM_RATIO = 0.5  # of a four-stroke engine's camshaft to its crank
 ROUNDS = 50

@@ -6,13 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Flags
 from gensig.driveline.excitation.cams import Cam, cam_torque
 from gensig.errors import ConfigError
 from gensig.units import from_si, unit
-
-Array = NDArray[np.float64]
 
 FINE = 20_001  # points of the lift, to find where the delivery ends
 
@@ -82,7 +80,7 @@ class Plunger:
         )
 
     def pressure(
-        self, lift: Array, rising: NDArray[np.bool_], volume: float, speed_share: float
+        self, lift: Array, rising: Flags, volume: float, speed_share: float
     ) -> Array:
         """Pressure over the plunger, (point,) Pa, at lifts of the cam in m.
 

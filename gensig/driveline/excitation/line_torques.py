@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.units import unit
-
-Array = NDArray[np.float64]
 
 POINTS = 2880  # of a cycle of two turns, a quarter of a degree
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.excitation.cycle import cycle_angles
 from gensig.driveline.excitation.line_torques import (
     LAWS,
@@ -20,8 +20,6 @@ from gensig.driveline.excitation.line_torques import (
     load_torques,
 )
 from gensig.errors import ConfigError
-
-Array = NDArray[np.float64]
 
 MOST_ORDER = 100.0  # of a ripple over the turn, which the steady response reaches
 

@@ -12,14 +12,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.excitation.cycle import CYCLE, Cylinder, cycle_angles
 from gensig.errors import ConfigError
 from gensig.text.user_file import check_columns, read_table
 from gensig.units import UNITS, split_unit, to_si, unit
-
-Array = NDArray[np.float64]
 
 BURNED = -math.log(
     1e-3

@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Complex
 from gensig.driveline.linear.dampers import TorsionalDamper
 from gensig.driveline.linear.forced import (
     TURNS_PER_CYCLE,
@@ -26,9 +26,6 @@ from gensig.driveline.linear.forced import (
 )
 from gensig.dynamics.linear_system import LinearSystem
 from gensig.errors import ConfigError
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 LEAST_INERTIA = 0.05  # of the largest allowed: a smaller ring is no damper
 # searched, of the ring on its spring; assumed: rubber has a loss factor of 0.1 and more
@@ -58,12 +55,12 @@ class NodeResponse:
     nodes: tuple[int, ...]
     frequency: Array
     mean: Array
-    force: ComplexArray
-    angle: ComplexArray
-    receptance: ComplexArray
-    transfer: ComplexArray
+    force: Complex
+    angle: Complex
+    receptance: Complex
+    transfer: Complex
 
-    def force_with(self, dampers: Sequence[TorsionalDamper]) -> ComplexArray:
+    def force_with(self, dampers: Sequence[TorsionalDamper]) -> Complex:
         """Complex amplitudes of the element's force with dampers on some of the nodes, (speed,
         order).
         """

@@ -11,13 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Complex
 from gensig.driveline.linear.shaft_line import Node, Shaft, ShaftLine
 from gensig.errors import ConfigError
 from gensig.units import unit
-
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +48,7 @@ class TorsionalDamper:
                 "damper: without damping and stiffness nothing holds the ring; give one of both"
             )
 
-    def dynamic_stiffness(self, frequency: NDArray[np.float64]) -> ComplexArray:
+    def dynamic_stiffness(self, frequency: Array) -> Complex:
         """Dynamic stiffness that it adds to its node at angular frequencies in rad/s, N m/rad.
 
         The ring's equation solved for the ring: -w^2 J (k + i w c) / (k + i w c - w^2 J).

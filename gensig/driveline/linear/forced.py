@@ -14,14 +14,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Complex
 from gensig.driveline.linear.matrices import LineMatrices
 from gensig.dynamics.linear_system import LinearSystem
 from gensig.errors import SimulationError
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 TURNS_PER_CYCLE = 2
 USUAL_ORDERS = 200  # half orders: up to order 100
@@ -80,11 +77,11 @@ class SteadyResponse:
 
     speed: float
     orders: Array
-    angle: ComplexArray
+    angle: Complex
     twist: Array
 
     @property
-    def speed_deviation(self) -> ComplexArray:
+    def speed_deviation(self) -> Complex:
         """Complex amplitudes of the speed, (dof, order) rad/s."""
         return 1j * self.speed * self.orders * self.angle
 
@@ -99,7 +96,7 @@ class SteadyResponse:
         """
         return 0.5 * np.ptp(self.speed_over_cycle(32 * len(self.orders)), axis=1)
 
-    def element_forces(self, elements: Elements) -> tuple[Array, ComplexArray]:
+    def element_forces(self, elements: Elements) -> tuple[Array, Complex]:
         """Mean (element,) and complex amplitudes (element, order) of what the elements carry, N m
         or N.
         """
@@ -110,7 +107,7 @@ class SteadyResponse:
         )
 
 
-def over_cycle(amplitudes: ComplexArray, n_points: int) -> Array:
+def over_cycle(amplitudes: Complex, n_points: int) -> Array:
     """Values over the cycle, (..., point), of complex amplitudes at orders 0.5, 1, ..., (...,
     order).
 
@@ -129,7 +126,7 @@ def over_cycle(amplitudes: ComplexArray, n_points: int) -> Array:
     return np.fft.irfft(spectrum, n_points, axis=-1)
 
 
-def cycle_orders(torque: Array, n_orders: int) -> tuple[Array, ComplexArray]:
+def cycle_orders(torque: Array, n_orders: int) -> tuple[Array, Complex]:
     """Mean (...,) and complex amplitudes (..., order) at orders 0.5, 1, ... of a torque over the
     cycle, (..., point).
 
@@ -175,7 +172,7 @@ def steady_response(
 
 def disturbance_response(
     line: LinearSystem, dof: int, torque: float, frequency: float
-) -> ComplexArray:
+) -> Complex:
     """Complex amplitudes, (dof,) rad, of a torque (N m) of a frequency (rad/s) of its own on one
     degree of freedom.
     """

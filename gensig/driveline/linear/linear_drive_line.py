@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gensig.driveline.line_gears import gear_dof, gear_names, line_bodies, meshes_of
 from gensig.driveline.running import RunningLine
 from gensig.dynamics.linear_system import LinearSystem
 from gensig.dynamics.response import GEAR_AXES, GearShaft, LinearMachine
 from gensig.units import SPEED
-
-Array = NDArray[np.float64]
 
 
 def linear_line(

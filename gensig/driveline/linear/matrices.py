@@ -11,14 +11,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Integers
 from gensig.driveline.linear.shaft_line import GearMesh, LineGear, ShaftLine
 from gensig.dynamics.bodies import HOUSING, Bodies, Motion, Spring
 from gensig.dynamics.pair import Support
 from gensig.errors import ConfigError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +51,7 @@ class LineMatrices:
     coordinate_names: tuple[str, ...]
     coordinate_mass: Array
     expand: Array
-    coordinate_node: NDArray[np.int64]
+    coordinate_node: Integers
 
     @property
     def whole_stiffness(self) -> Array:

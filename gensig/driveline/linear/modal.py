@@ -9,12 +9,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.linear.matrices import LineMatrices
 from gensig.errors import SimulationError
-
-Array = NDArray[np.float64]
 
 # Of the highest frequency. Below it is rounding: springs are resolved to 1e-16 of the stiffest.
 RIGID_SHARE = 1e-7

@@ -15,12 +15,11 @@ from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.pair import Support
 from gensig.errors import ConfigError
 
-Array = NDArray[np.float64]
 Groups = tuple[tuple[int, ...], ...]
 
 

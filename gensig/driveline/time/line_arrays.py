@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array, Integers
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time import _newmark_kernels as kernels
 from gensig.driveline.time._layout import (
@@ -24,15 +25,12 @@ from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import SimulationError
 from gensig.mesh.tooth_table import ToothTable, left_out_energy
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-
 # of a matrix that is filled, or of a triangle of its factor: from there on, all of it costs less
 FULL = 0.5
 
 
 def pack_line(
-    line: Dynamics, order: Index, mass_share: float, damping_share: float, step: str
+    line: Dynamics, order: Integers, mass_share: float, damping_share: float, step: str
 ) -> Line:
     """The line with its degrees of freedom in ``order``, and the factor of mass_share M +
     damping_share C + K.
@@ -69,7 +67,7 @@ def pack_line(
     )
 
 
-def elimination_order(system: Equations) -> Index:
+def elimination_order(system: Equations) -> Integers:
     """Order of the degrees of freedom that keeps the factor's rows short, (dof,).
 
     Reverse Cuthill-McKee.
@@ -84,7 +82,7 @@ def elimination_order(system: Equations) -> Index:
     )
 
 
-def pack_meshes(system: Equations, order: Index) -> Meshes:
+def pack_meshes(system: Equations, order: Integers) -> Meshes:
     """All meshes of a line, its degrees of freedom in ``order``.
 
     The law is that of the pair dynamics. The back flanks are healthy teeth without errors, mirrored
@@ -215,7 +213,7 @@ def pack_course(line: Dynamics) -> Knots:
     )
 
 
-def pack_torques(line: Dynamics, order: Index) -> Torques:
+def pack_torques(line: Dynamics, order: Integers) -> Torques:
     """All torques at the knots of the nominal rotation, degrees of freedom in ``order``."""
     sources, at_of = line.equations.sources, np.argsort(order)
     times = line.nominal.with_knots().time
@@ -234,7 +232,7 @@ def pack_torques(line: Dynamics, order: Index) -> Torques:
     )
 
 
-def _rubbing(system: Equations, order: Index) -> Array:
+def _rubbing(system: Equations, order: Integers) -> Array:
     """Directions of the friction of every mesh and of its moments, (3 mesh, dof).
 
     An angle that counts against its rotation feels moments the other way.

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Integers
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time import _newmark_kernels as kernels
 from gensig.driveline.time._layout import Work
@@ -30,8 +30,6 @@ from gensig.dynamics.equations import Equations
 from gensig.dynamics.motion.at_rest import OUT_OF_BOUNDS
 from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import ConfigError, SimulationError, StepError
-
-Array = NDArray[np.float64]
 
 KINDS = ("angle", "speed", "acceleration", "mesh_force")
 BLOCK = 512  # output samples that are integrated between two passes of the low-pass
@@ -235,7 +233,7 @@ class _Run:
         q, v, *_ = self.state
         return float(kernels.energy(self.packed, q, v, self.law, self.work))
 
-    def advance(self, n_steps: int, channels: NDArray[np.int64], out: Array) -> None:
+    def advance(self, n_steps: int, channels: Integers, out: Array) -> None:
         """Integrate on, and give out the means of channels over every step, (step, column)."""
         failed = kernels.advance(
             *(self.packed, self.meshes, self.torques, self.course, self.state),

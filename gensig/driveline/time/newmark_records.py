@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.channels import channel_rows
 from gensig.driveline.running import RunningLine
 from gensig.driveline.time.newmark import LineMotion
@@ -16,7 +16,6 @@ from gensig.dynamics.mesh_state import MeshState, mesh_state
 from gensig.faults.base import faulty_teeth
 from gensig.systems.run import CleanRecord, Run
 
-Array = NDArray[np.float64]
 LineRun = Run[Any]  # of a ``LineMachine``, whose module imports this one
 Channel = tuple[str, int]
 

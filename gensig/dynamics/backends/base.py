@@ -6,16 +6,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from gensig.arrays import Array, Flags
 from gensig.dynamics._layout import MOST_PAIRS as MOST_PAIRS
 from gensig.dynamics._layout import N_SEEN as N_SEEN
 from gensig.dynamics._layout import SEEN_FORCE as SEEN_FORCE
 from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import ConfigError
-
-Array = NDArray[np.float64]
 
 BOUNCING = 0.01  # share of the time without contact above which teeth bounce
 # m, rad, m/s or rad/s: no machine moves so far; a motion that overflows may become finite again
@@ -82,7 +78,7 @@ class Motions:
     seen: Sequence[Array]
     mean_speed: Array
     contact_loss: Array
-    finite: NDArray[np.bool_]
+    finite: Flags
 
 
 class Backend(ABC):

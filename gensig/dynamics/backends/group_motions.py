@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.backends.base import OUT_OF_BOUNDS, Integration, Motions
 from gensig.dynamics.backends.group_run import Core, GroupRun
@@ -18,8 +18,6 @@ from gensig.dynamics.backends.step_limits import FINE_TIME, SETTLING_STEPS
 from gensig.dynamics.decimation import decimator
 from gensig.dynamics.lanes import at_step, fill_lanes
 from gensig.dynamics.motion.dynamics import Dynamics
-
-Array = NDArray[np.float64]
 
 SHORT_ROWS = "check", "mean_speed", "contact_loss", "finite"  # of ``Motions``
 CHECKED = 0.03  # s at the beginning of a record, integrated again at half the step

@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array, Flags, Integers
 from gensig.dynamics import _record_kernels
 from gensig.dynamics._layout import CENTER, N_SEEN
 from gensig.dynamics._record_kernels import LOW_PASS_PRECISION
 from gensig.dynamics._vector import aligned, n_lanes
 from gensig.dynamics.decimation import Decimator
 from gensig.dynamics.motion.dynamics import Dynamics
-
-Array = NDArray[np.float64]
-
 
 NOTHING = np.empty(0)
 NO_TAPS = np.empty(0, dtype=LOW_PASS_PRECISION)
@@ -39,7 +37,7 @@ class Core:
     """
 
     pack: Callable[[Sequence[Dynamics], float, str, tuple[float, float]], Any]
-    scratch: Callable[[int, int, str], tuple[NDArray[Any], Array, NDArray[np.int64]]]
+    scratch: Callable[[int, int, str], tuple[NDArray[Any], Array, Integers]]
     integrate: Any
     record: Any
     coarsest_oversampling: Callable[[Dynamics, int, float], int]
@@ -51,7 +49,7 @@ class GroupRun:
     def __init__(
         self,
         lanes: Sequence[Dynamics],
-        channels: NDArray[np.int64],
+        channels: Integers,
         precision: str,
         core: Core,
     ) -> None:
@@ -70,7 +68,7 @@ class GroupRun:
         """Rotation of the pinions that ``state`` does not contain, (lane,) rad; a view."""
         return self.wide.reshape(-1, self.n_lanes)[CENTER]
 
-    def is_within(self, bound: float) -> NDArray[np.bool_]:
+    def is_within(self, bound: float) -> Flags:
         """Lanes whose state is finite and below a bound, (lane,)."""
         return np.asarray((np.abs(self.state) < bound).all(axis=(0, 1)))
 
@@ -80,7 +78,7 @@ class GroupRun:
         self.state[1, :, lane] = rate
         self.center[lane], self.fresh[lane], self.lost[:, lane] = 0.0, 1.0, 0.0
 
-    def take(self, other: GroupRun, lanes: NDArray[np.bool_]) -> None:
+    def take(self, other: GroupRun, lanes: Flags) -> None:
         """Copy the state of some lanes, (lane,), from another run; ``restarted`` must follow."""
         self.state[:, :, lanes] = other.state[:, :, lanes]
         self.center[lanes] = other.center[lanes]

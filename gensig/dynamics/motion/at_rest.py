@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.equations import Equations
 from gensig.dynamics.mesh_teeth import MeshTeeth
-
-Array = NDArray[np.float64]
 
 ROUNDS = 20
 SAME = 1e-12  # share of the deflection by which it changes in the last round

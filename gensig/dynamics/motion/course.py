@@ -8,13 +8,11 @@ from functools import cached_property
 from typing import NamedTuple, final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.operation.setpoint import Operating
 from gensig.units import from_si
-
-Array = NDArray[np.float64]
 
 
 class Turning(NamedTuple):

@@ -9,16 +9,14 @@ from functools import cached_property
 from typing import Protocol, final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Complex
 from gensig.dynamics.equations import Equations, OverAngle
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.motion.at_rest import OUT_OF_BOUNDS, at_rest
 from gensig.dynamics.motion.course import Course, ShaftTorque
 from gensig.dynamics.motion.motion_checks import check_system, check_torques
 from gensig.errors import SimulationError
-
-Array = NDArray[np.float64]
 
 LONGEST_SETTLING = 0.45  # s
 MOST_NAMED = 3  # degrees of freedom in an error
@@ -34,7 +32,7 @@ class Vibration(Protocol):
         """Orders of the reference, (order,)."""
 
     @property
-    def angle(self) -> NDArray[np.complex128]:
+    def angle(self) -> Complex:
         """Complex amplitudes, (dof, order) rad or m."""
 
 
@@ -189,7 +187,7 @@ class Dynamics:
         return forces
 
     @cached_property
-    def stiff_rates(self) -> NDArray[np.complex128]:
+    def stiff_rates(self) -> Complex:
         """Eigenvalues that the steps must follow: of meshes stiffer than their mean, 1/s."""
         return self.equations.rates(STIFFER * self.mesh_stiffness)
 

@@ -9,16 +9,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import GeometryError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.life.root.tooth_root import root_loading, root_section
 from gensig.mesh.sliced.slice_energy import structure_deflection
 from gensig.units import check_choice
-
-Array = NDArray[np.float64]
 
 LOAD_POINTS = ("outer_single_pair", "tip")
 EDITIONS = (2019, 2006)

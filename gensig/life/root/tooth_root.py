@@ -10,13 +10,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ExtrapolationError, GeometryError
 from gensig.geometry.gear import Gear
 from gensig.geometry.involute import involute
-
-Array = NDArray[np.float64]
 
 # rad, of the root's tangent to the tooth centreline at the critical section
 TANGENT = math.pi / 6.0

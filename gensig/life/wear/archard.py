@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.geometry.contact import SIDES, GearPair
 from gensig.life.options import WearOptions
 from gensig.material import Material
-
-Array = NDArray[np.float64]
 
 # conforming flanks, where the sum of worn and new curvature falls towards 0, press at least like
 # cylinders of this share of the new curvature: Hertz's theory ends there

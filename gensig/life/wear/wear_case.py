@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
@@ -26,8 +26,6 @@ from gensig.life.wear.worn_contact import (
 )
 from gensig.material import Material
 from gensig.mesh.sliced.slices import SlicedMesh
-
-Array = NDArray[np.float64]
 
 # the second is stiff, and does not converge anyhow
 N_NODES = {"band": 101, "fixed_intervals": 51}

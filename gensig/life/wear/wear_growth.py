@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.life.growth import GrowthLaw
 from gensig.life.wear.wear_case import WearCase
 from gensig.life.wear.wear_life import WearLife, wear_life
-
-Array = NDArray[np.float64]
 
 N_DEPTHS = 121
 N_TORQUES = 3  # life goes nearly as a power of the torque

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError, SimulationError
 from gensig.life.wear.wear_case import WearCase
-
-Array = NDArray[np.float64]
 
 # Error of the solver in one step, as a share of the depth and in m. Pressures depend on the
 # curvature of the worn profile, which takes a tenth. That makes the equations stiff: they are

@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Integers
 from gensig.errors import GeometryError, SimulationError
 from gensig.life.wear.archard import FlankPath
 from gensig.mesh.sliced.slices import (
@@ -21,9 +21,6 @@ from gensig.mesh.sliced.slices import (
     contact_phases,
     settled_contact,
 )
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 # of a mesh in several slices, whose slices pass the nodes at other phases than these
 PHASES_PER_PITCH = 24
@@ -39,7 +36,7 @@ class WornContact:
     """
 
     phases: ContactPhases
-    node: Indices
+    node: Integers
     share: Array
 
     def settled(self, depth: Array, force: float) -> LoadedContact:
@@ -92,8 +89,8 @@ class PathLoads:
     """
 
     contact: WornContact
-    before: Indices
-    after: Indices
+    before: Integers
+    after: Integers
     share: Array
 
     def line_load(self, depth: Array, force: float) -> Array:

@@ -9,16 +9,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.geometry.tooth import healthy_tooth
 from gensig.material import Material
 from gensig.mesh.pair_table import structural_terms
 from gensig.mesh.sliced.slices import SlicedMesh, cut_by_field, pair_positions
 from gensig.mesh.thermal.paper_growth import PaperGrowth
 from gensig.mesh.thermal.paper_teeth import paper_terms
-
-Array = NDArray[np.float64]
 
 
 def component_compliances(

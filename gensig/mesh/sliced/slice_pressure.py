@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.material import Material
 from gensig.mesh.local_contact import relative_radius
 from gensig.mesh.sliced.slices import LoadedContact, SlicedMesh
-
-Array = NDArray[np.float64]
 
 
 def contact_pressure(

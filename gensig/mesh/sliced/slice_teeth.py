@@ -6,8 +6,8 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Flags, Integers
 from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
@@ -24,8 +24,6 @@ from gensig.mesh.pair_table import (
     structural_compliance,
 )
 from gensig.mesh.root_crack import crack_compliance
-
-Array = NDArray[np.float64]
 
 NO_FLANK = 1.0  # m; gap of a missing flank, finite for interpolation
 NARROWEST = 1e-6  # of the face; edges closer than this are merged
@@ -46,8 +44,8 @@ class GearSlices:
 
     softening: Array
     gap: Array
-    present: NDArray[np.bool_]
-    kind: NDArray[np.int64]
+    present: Flags
+    kind: Integers
 
 
 def is_uneven(tooth: Tooth) -> bool:
@@ -131,7 +129,7 @@ def _overhang(pair: GearPair, gear: Gear) -> float:
     return 0.5 * (gear.face_width - pair.face_width)
 
 
-def _source(tooth: Tooth, pair: GearPair, edges: Array) -> NDArray[np.int64]:
+def _source(tooth: Tooth, pair: GearPair, edges: Array) -> Integers:
     """Index of the tooth's slice that contains each slice of the pair, (slice,)."""
     middle = 0.5 * (edges[1:] + edges[:-1]) + _overhang(pair, tooth.gear)
     index = np.searchsorted(tooth.slice_edges, middle) - 1

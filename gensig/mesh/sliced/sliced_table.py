@@ -13,8 +13,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Integers
 from gensig.errors import FaultError, GeometryError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import Tooth, healthy_tooth
@@ -38,8 +38,6 @@ from gensig.mesh.sliced.slices import (
 from gensig.mesh.smooth_table import smooth
 from gensig.mesh.thermal.paper_growth import PaperGrowth
 from gensig.mesh.tooth_table import GearTeeth, TablePart, ToothTable
-
-Array = NDArray[np.float64]
 
 N_CHORDS = 8
 N_TRIED, N_SAMPLES = 32, 24  # depths and positions at which chords are chosen
@@ -156,7 +154,7 @@ def sliced_table(
     )
 
 
-def _gear_teeth(distinct: list[Tooth], kind: NDArray[np.int64]) -> GearTeeth:
+def _gear_teeth(distinct: list[Tooth], kind: Integers) -> GearTeeth:
     present = np.array([tooth.present for tooth in distinct])
     return GearTeeth(kind=kind, present=present)
 
@@ -165,8 +163,8 @@ def _all_curves(
     setting: _Setting,
     pinion: list[Tooth],
     wheel: list[Tooth],
-    pinion_kind: NDArray[np.int64],
-    wheel_kind: NDArray[np.int64],
+    pinion_kind: Integers,
+    wheel_kind: Integers,
 ) -> tuple[Array, Array]:
     """First gap and force of every tooth pair by kinds, (pinion kind, wheel kind, ...)."""
     frame = _frame(setting)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Integers
 from gensig.errors import ConfigError, ExtrapolationError, GeometryError
 from gensig.geometry.contact import GearPair, corner_gap_by_pinion
 from gensig.geometry.tooth import Tooth, healthy_tooth
@@ -37,8 +37,6 @@ from gensig.mesh.sliced.slice_teeth import (
 )
 from gensig.mesh.thermal.paper_growth import PaperGrowth
 from gensig.mesh.thermal.paper_teeth import paper_terms
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -118,7 +116,7 @@ class LoadedContact:
     """
 
     roll: Array
-    pair_index: NDArray[np.int64]
+    pair_index: Integers
     position: Array
     approach: Array
     stiffness: Array
@@ -229,7 +227,7 @@ def _structure(
     return left[inverse], shared
 
 
-def pair_positions(mesh: SlicedMesh, roll: Array) -> tuple[Array, NDArray[np.int64]]:
+def pair_positions(mesh: SlicedMesh, roll: Array) -> tuple[Array, Integers]:
     """Positions s of every pair's slices, (phase, pair, slice) m, and pair numbers, (phase, pair).
 
     The pair that enters at roll 0 has number 0. Pairs are in order of entry, newest first.
@@ -257,7 +255,7 @@ class ContactPhases:
 
     mesh: SlicedMesh
     roll: Array
-    pair_index: NDArray[np.int64]
+    pair_index: Integers
     position: Array
     structure: Array
     constant: Array
@@ -364,7 +362,7 @@ def _gaps(mesh: SlicedMesh, position: Array) -> Array:
 def _add_teeth(
     mesh: SlicedMesh,
     position: Array,
-    index: NDArray[np.int64],
+    index: Integers,
     meeting: Meeting,
     structure: Array,
     gap: Array,

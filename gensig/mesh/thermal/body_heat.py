@@ -9,14 +9,12 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.thermal.heat import Heat
-
-Array = NDArray[np.float64]
 
 N_RADII = 201
 N_TOOTH_HEIGHTS = 65

@@ -10,15 +10,13 @@ import math
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError, ExtrapolationError
 from gensig.geometry.contact import GearPair
 from gensig.material import Material
 from gensig.mesh.local_contact import relative_radius
 from gensig.units import from_si, split_unit, unit
-
-Array = NDArray[np.float64]
 
 # Blok's constant with the semi-width of the contact; with its full width the same formula has 1.11
 BLOK_SEMI_WIDTH = 0.785

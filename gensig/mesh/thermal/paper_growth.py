@@ -6,16 +6,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth_profile import load_angle
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,105 +192,93 @@ def _moment(
     return 0.5 * rises[0] * (radius**2 - bore**2) + slope * logarithmic
 
 
-def hot_outline(
-    gear: Gear,
-    growth: PaperGearGrowth,
-    reading: Reading,
-    strain: Array,
-    radius: Array,
-    half_angle: Array,
-) -> tuple[Array, Array]:
-    """Radii R' and half angles of points of the tooth's outline, each (phase, point).
-
-    Parameters
-    ----------
-    strain : (phase, 1)             lambda dT
-    radius, half_angle : (point,)   or (phase, 1); of the cold outline, m and rad
-
-    Source: thermal paper eqs. (10) to (12), and (15), whose alpha_2 holds the growth of the base
-    circle's angle, theta'(0). The tooth's half angle is alpha_2 - theta'. A point below the
-    involute moves by the same equations.
-    """
-    grown = radius + growth.base + strain * (radius - gear.base_radius)
-    if reading.angles == "once":
-        return grown, half_angle + np.zeros_like(grown)
-    wider = strain * radius * half_angle / grown
-    if reading.angles == "printed":
-        wider = wider - _base_widening(gear, growth, reading, strain)
-    return grown, half_angle + wider
-
-
-def base_half_angle(gear: Gear, reading: Reading) -> float:
-    """Half angle of the cold tooth at the base circle, rad.
-
-    alpha_2 of eq. (15) leaves out what the profile shift adds.
-    """
-    if not reading.has_misprints:
-        return gear.half_tooth_angle_base
-    return gear.half_tooth_angle_base - shift_angle(gear)
-
-
 def shift_angle(gear: Gear) -> float:
     """Half angle that the profile shift adds to the tooth, 2 x tan(alpha_n) / z, rad."""
     return 2.0 * gear.profile_shift * math.tan(gear.pressure_angle) / gear.n_teeth
 
 
-def _base_widening(
-    gear: Gear, growth: PaperGearGrowth, reading: Reading, strain: Array
-) -> Array:
-    """Growth of the half angle at the base circle, -theta'(0), of the shape of ``strain``."""
-    radius = gear.base_radius
-    return strain * radius * base_half_angle(gear, reading) / (radius + growth.base)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HotGear:
+    """The teeth of one grown gear by a reading of the equations."""
 
+    gear: Gear
+    growth: PaperGearGrowth
+    reading: Reading
 
-def hot_load_angle(
-    gear: Gear,
-    growth: PaperGearGrowth,
-    reading: Reading,
-    curvature_radius: Array,
-    entry: tuple[float, float],
-) -> Array:
-    """Angle alpha' between the load and the tooth's thickness direction, (phase,) rad.
+    def outline(
+        self, strain: Array, radius: Array, half_angle: Array
+    ) -> tuple[Array, Array]:
+        """Radii R' and half angles of points of the tooth's outline, each (phase, point).
 
-    Parameters
-    ----------
-    curvature_radius : (phase,) m    of the cold flank
-    entry : m and strain             curvature radius where the tooth enters, and its strain
+        Parameters
+        ----------
+        strain : (phase, 1)             lambda dT
+        radius, half_angle : (point,)   or (phase, 1); of the cold outline, m and rad
 
-    Source: thermal paper eqs. (20) and (23): the angle of the hot profile's normal where the tooth
-    enters contact, and the gear's rotation from there.
-    """
-    start = np.array([entry[0]])
-    turned = _normal_angle(gear, growth, reading, entry[1], start)
-    cold = _normal_angle(gear, _AT_REST, reading, 0.0, start)
-    return load_angle(gear, curvature_radius) + float((turned - cold)[0])
+        Source: thermal paper eqs. (10) to (12), and (15), whose alpha_2 holds the growth of the
+        base circle's angle, theta'(0). The tooth's half angle is alpha_2 - theta'. A point below
+        the involute moves by the same equations.
+        """
+        base, moved = self.gear.base_radius, self.growth.base
+        grown = radius + moved + strain * (radius - base)
+        if self.reading.angles == "once":
+            return grown, half_angle + np.zeros_like(grown)
+        wider = strain * radius * half_angle / grown
+        if self.reading.angles == "printed":
+            # the growth of the half angle at the base circle, -theta'(0)
+            wider = wider - strain * base * self.base_half_angle / (base + moved)
+        return grown, half_angle + wider
 
+    def base_point(self, strain: Array) -> tuple[Array, Array]:
+        """``outline`` of the point on the base circle, (phase, 1)."""
+        base = np.array([self.gear.base_radius])
+        return self.outline(strain, base, np.array([self.base_half_angle]))
 
-def _normal_angle(
-    gear: Gear,
-    growth: PaperGearGrowth,
-    reading: Reading,
-    strain: float,
-    curvature: Array,
-) -> Array:
-    """arccot(-x' / z') of the hot profile at curvature radii of the cold one, (point,) rad."""
-    base = gear.base_radius
-    radius = np.hypot(base, curvature)
-    roll = curvature / base
-    half = base_half_angle(gear, reading) - (roll - np.arctan(roll))
-    grown, angle = hot_outline(
-        gear, growth, reading, np.array([[strain]]), radius, half
-    )
-    grown, angle = grown[0], angle[0]
-    radius_slope = curvature / radius
-    half_slope = -(curvature**2) / (base * radius**2)
-    grown_slope = (1.0 + strain) * radius_slope
-    angle_slope = half_slope
-    if reading.angles != "once":
-        arc_slope = radius_slope * half + radius * half_slope
-        of_radius = radius * half * grown_slope / grown
-        angle_slope = half_slope + strain * (arc_slope - of_radius) / grown
-    turn = grown * angle_slope
-    height = grown_slope * np.cos(angle) - turn * np.sin(angle)
-    thickness = grown_slope * np.sin(angle) + turn * np.cos(angle)
-    return np.arctan2(-thickness, height)
+    @property
+    def base_half_angle(self) -> float:
+        """Half angle of the cold tooth at the base circle, rad.
+
+        alpha_2 of eq. (15) leaves out what the profile shift adds.
+        """
+        if not self.reading.has_misprints:
+            return self.gear.half_tooth_angle_base
+        return self.gear.half_tooth_angle_base - shift_angle(self.gear)
+
+    def half_angle(self, roll: Array) -> Array:
+        """Half angle of the cold flank at roll angles, (point,) rad."""
+        return self.base_half_angle - (roll - np.arctan(roll))
+
+    def load_angle(self, curvature_radius: Array, entry: tuple[float, float]) -> Array:
+        """Angle alpha' between the load and the tooth's thickness direction, (phase,) rad.
+
+        Parameters
+        ----------
+        curvature_radius : (phase,) m    of the cold flank
+        entry : m and strain             curvature radius where the tooth enters, and its strain
+
+        Source: thermal paper eqs. (20) and (23): the angle of the hot profile's normal where the
+        tooth enters contact, and the gear's rotation from there.
+        """
+        start, strain = np.array([entry[0]]), entry[1]
+        at_rest = replace(self, growth=_AT_REST)
+        turned = self._normal_angle(strain, start) - at_rest._normal_angle(0.0, start)
+        return load_angle(self.gear, curvature_radius) + float(turned[0])
+
+    def _normal_angle(self, strain: float, curvature: Array) -> Array:
+        """arccot(-x' / z') of the hot profile at curvature radii of the cold one, (point,) rad."""
+        base = self.gear.base_radius
+        radius = np.hypot(base, curvature)
+        half = self.half_angle(curvature / base)
+        (grown,), (angle,) = self.outline(np.array([[strain]]), radius, half)
+        radius_slope = curvature / radius
+        half_slope = -(curvature**2) / (base * radius**2)
+        grown_slope = (1.0 + strain) * radius_slope
+        angle_slope = half_slope
+        if self.reading.angles != "once":
+            arc_slope = radius_slope * half + radius * half_slope
+            of_radius = radius * half * grown_slope / grown
+            angle_slope = half_slope + strain * (arc_slope - of_radius) / grown
+        turn = grown * angle_slope
+        height = grown_slope * np.cos(angle) - turn * np.sin(angle)
+        thickness = grown_slope * np.sin(angle) + turn * np.cos(angle)
+        return np.arctan2(-thickness, height)

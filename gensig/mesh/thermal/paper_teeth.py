@@ -6,26 +6,19 @@ The equations hold for a slice; per width they are those of any slice (eqs. 16, 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Integers
 from gensig.geometry.contact import GearPair
-from gensig.geometry.gear import Gear
 from gensig.geometry.tooth_profile import tooth_profile
 from gensig.material import Material
 from gensig.mesh.compliance import SHEAR_FACTORS
-from gensig.mesh.fillet_foundation import body_coefficients
+from gensig.mesh.fillet_foundation import lever_compliance
 from gensig.mesh.options import MeshOptions
 from gensig.mesh.thermal.paper_growth import (
-    PaperGearGrowth,
+    HotGear,
     PaperGrowth,
-    Reading,
-    base_half_angle,
-    hot_load_angle,
-    hot_outline,
     shift_angle,
 )
-
-Array = NDArray[np.float64]
 
 PHASES_AT_ONCE = 256
 TERMS = ("bending", "shear", "axial", "foundation")
@@ -50,7 +43,7 @@ def paper_terms(
     sin(alpha_m) in A of eq. (18), z(alpha_k) for z(0) in eq. (28), E dy and the lever arm's z
     tan(alpha') in eq. (29), and the profile shift in alpha_2. L* to Q* are of the cold sizes.
     """
-    gear, own = pair.gears[side], growth.of(side)
+    gear = HotGear(gear=pair.gears[side], growth=growth.of(side), reading=growth.rules)
     curvature = np.asarray(pair.curvature(side, position))
     enters = np.array([0.0])
     entry = (
@@ -58,19 +51,17 @@ def paper_terms(
         float(growth.strain(side, enters)[0]),
     )
     strain = growth.strain(side, position)
-    angle = hot_load_angle(gear, own, growth.rules, curvature, entry)
+    angle = gear.load_angle(curvature, entry)
     parts = []
     for begin in range(0, len(position), PHASES_AT_ONCE):
         some = slice(begin, begin + PHASES_AT_ONCE)
         at = curvature[some], angle[some], strain[some]
-        parts.append(_terms(gear, own, growth.rules, material, options, *at))
+        parts.append(_terms(gear, material, options, *at))
     return {name: np.concatenate([part[name] for part in parts]) for name in TERMS}
 
 
 def _terms(
-    gear: Gear,
-    growth: PaperGearGrowth,
-    reading: Reading,
+    hot: HotGear,
     material: Material,
     options: MeshOptions,
     curvature: Array,
@@ -78,19 +69,18 @@ def _terms(
     strain: Array,
 ) -> dict[str, Array]:
     """``paper_terms`` at some curvature radii, load angles and strains, (phase,) each."""
+    gear, reading = hot.gear, hot.reading
     profile = tooth_profile(gear)
     less = shift_angle(gear) if reading.has_misprints else 0.0
     radius = np.hypot(profile.abscissa, profile.half_thickness)
     half = np.arctan2(profile.half_thickness, profile.abscissa) - less
     strains = strain[:, None]
-    x, z = _cartesian(*hot_outline(gear, growth, reading, strains, radius, half))
+    x, z = _cartesian(*hot.outline(strains, radius, half))
     base, roll = gear.base_radius, curvature / gear.base_radius
     contact = np.hypot(base, curvature)
-    contact_half = base_half_angle(gear, reading) - (roll - np.arctan(roll))
+    contact_half = hot.half_angle(roll)
     at_contact = contact[:, None], contact_half[:, None]
-    x_load, z_load = _cartesian(
-        *hot_outline(gear, growth, reading, strains, *at_contact)
-    )
+    x_load, z_load = _cartesian(*hot.outline(strains, *at_contact))
     # the contact lies between the same points of the outline, hot or cold
     cold_x = radius * np.cos(half)
     cell = np.searchsorted(cold_x, contact * np.cos(contact_half)) - 1
@@ -101,10 +91,7 @@ def _terms(
     step, young = np.diff(x, axis=1), material.youngs_modulus * gear.face_width
     axial_z = middle_z
     if reading.has_misprints:
-        base_point = np.array([base]), np.array([base_half_angle(gear, reading)])
-        axial_z = _cartesian(*hot_outline(gear, growth, reading, strains, *base_point))[
-            1
-        ]
+        axial_z = _cartesian(*hot.base_point(strains))[1]
     integrands = {
         "bending": arm**2 * 12.0 / (young * (2.0 * middle_z) ** 3),
         "shear": SHEAR_FACTORS["to_contact"]
@@ -123,14 +110,12 @@ def _terms(
     load = angle, x_load[:, 0], z_load[:, 0], strain
     return {
         **terms,
-        "foundation": _foundation(gear, growth, reading, material, options, *load),
+        "foundation": _foundation(hot, material, options, *load),
     }
 
 
 def _foundation(
-    gear: Gear,
-    growth: PaperGearGrowth,
-    reading: Reading,
+    hot: HotGear,
     material: Material,
     options: MeshOptions,
     angle: Array,
@@ -139,26 +124,21 @@ def _foundation(
     strain: Array,
 ) -> Array:
     """Compliance of the body under one loaded tooth, (phase,) m/N: eq. (29)."""
-    values = body_coefficients(gear, allow_extrapolation=options.allow_extrapolation)
-    root = gear.root_radius + growth.root
-    if reading.has_misprints:
+    gear, strains = hot.gear, strain[:, None]
+    root = gear.root_radius + hot.growth.root
+    if hot.reading.has_misprints:
         height = x_load - root
-        base = np.array([gear.base_radius]), np.array([base_half_angle(gear, reading)])
-        strains = strain[:, None]
-        grown, half = hot_outline(gear, growth, reading, strains, *base)
+        grown, half = hot.base_point(strains)
         root_half = np.arcsin(grown[:, 0] * np.sin(half[:, 0]) / root)
     else:
         height = x_load - z_load * np.tan(angle) - root
         cold = np.array([gear.root_radius]), np.array([gear.root_half_angle])
-        _, half = hot_outline(gear, growth, reading, strain[:, None], *cold)
-        root_half = half[:, 0]
+        root_half = hot.outline(strains, *cold)[1][:, 0]
     lever = height / (2.0 * root * root_half)
-    bracket = (
-        values["L"] * lever**2
-        + values["M"] * lever
-        + values["P"] * (1.0 + values["Q"] * np.tan(angle) ** 2)
+    extrapolates = options.allow_extrapolation
+    return lever_compliance(
+        gear, angle, lever, material, allow_extrapolation=extrapolates
     )
-    return np.cos(angle) ** 2 / (gear.face_width * material.youngs_modulus) * bracket
 
 
 def _cartesian(radius: Array, half_angle: Array) -> tuple[Array, Array]:
@@ -166,9 +146,7 @@ def _cartesian(radius: Array, half_angle: Array) -> tuple[Array, Array]:
     return radius * np.cos(half_angle), radius * np.sin(half_angle)
 
 
-def _up_to(
-    cells: Array, cell: NDArray[np.int64], abscissa: Array, x_load: Array
-) -> Array:
+def _up_to(cells: Array, cell: Integers, abscissa: Array, x_load: Array) -> Array:
     """Sums of cells up to the load, (phase,); ``cells`` (phase, cell), the load in ``cell``."""
     row = np.arange(len(cell))
     running = np.concatenate([np.zeros((len(cells), 1)), np.cumsum(cells, axis=1)], 1)

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.geometry.contact import SIDES, GearPair
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth_profile import load_angle
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

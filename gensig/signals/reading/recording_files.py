@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.signals.reading.promised_sizes import (
     check_decoded,
@@ -27,8 +27,6 @@ from gensig.signals.reading.promised_sizes import (
     check_wav,
 )
 from gensig.text.user_file import read_table
-
-Array = NDArray[np.float64]
 
 ARRAY_KEY = "acceleration"
 RATE_KEY = "sampling_rate_hz"

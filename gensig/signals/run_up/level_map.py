@@ -9,7 +9,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-FloatArray = NDArray[np.floating]
+from gensig.arrays import FloatArray
 
 FEWEST_SPEEDS, MOST_SPEEDS = 12, 60  # of a map by speed
 LEAST_PROMINENCE = 3.0  # dB; assumed

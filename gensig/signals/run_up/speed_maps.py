@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gensig.arrays import FloatArray
 from gensig.signals.resampling import PASS_SHARE
 from gensig.signals.rotation import resample_by_angle
 from gensig.signals.run_up.level_map import LevelMap
-
-FloatArray = NDArray[np.floating]
 
 LEAST_CHANGE = 0.05  # of the speed, from which a record counts as a run-up
 LEAST_TURNS = 8  # of a record with an order map

@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Flags
 from gensig.signals.mesh_motion import Teeth
 from gensig.signals.resampling import PASS_SHARE
-
-Array = NDArray[np.float64]
 
 # bins to either side of a line in which a Hann window leaves 99.9 % of its power
 SPREAD = 2
@@ -34,7 +32,7 @@ class Lines:
     power: Array
     floor: Array
     frequency: Array
-    is_line: NDArray[np.bool_]
+    is_line: Flags
     n_cycles: int
     mesh_frequency: float
 
@@ -109,7 +107,7 @@ def find_lines(
     )
 
 
-def _floor(power: Array, is_line: NDArray[np.bool_]) -> Array:
+def _floor(power: Array, is_line: Flags) -> Array:
     """Mean of noise in stretches of bins without lines, (sensor, bin).
 
     It is the median over ln 2, which lines of others do not raise.

@@ -6,20 +6,18 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Complex, Flags
 from gensig.errors import ConfigError
 from gensig.signals.recording import Recording
 from gensig.signals.transfer.order_lines import Lines, band_centers, band_sums
-
-Array = NDArray[np.float64]
 
 SURE = 3.0  # standard deviations above the floor from which the power of lines counts
 
 
 def fit_path(
     measured: Lines, simulated: Sequence[Lines], recording: Recording
-) -> tuple[Array, Array, NDArray[np.bool_]]:
+) -> tuple[Array, Array, Flags]:
     """Gain from the simulated bearing to each sensor, from half the mesh frequency up.
 
     It is the root of the measured over the simulated power of the shafts' orders, in sixths of an
@@ -74,7 +72,7 @@ def gain_at(wanted: Array, frequency: Array, gain: Array) -> Array:
 
 def minimum_phase(
     frequency: Array, gain: Array, sampling_rate: float, step: float
-) -> tuple[Array, NDArray[np.complex128]]:
+) -> tuple[Array, Complex]:
     """Causal response with the given gain and the least delay.
 
     Its frequencies are even from 0 to half the rate.

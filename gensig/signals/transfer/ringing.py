@@ -19,7 +19,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.signals.separation import FloatArray, GearTurns
+from gensig.arrays import Array, FloatArray
+from gensig.signals.separation import GearTurns
 
 MEMORY = 1.2e-3  # s of the inverse filter; assumed, 61 samples at 51.2 kHz
 RIDGE = 1e-3  # of the mean power, as white noise that is added to the lines; assumed
@@ -83,7 +84,7 @@ def _autocorrelation(
     return total
 
 
-def _prediction_error(lags: FloatArray) -> NDArray[np.float64]:
+def _prediction_error(lags: FloatArray) -> Array:
     """(lag + 1,) inverse of the all-pole filter with this autocorrelation."""
     from scipy.linalg import solve_toeplitz
 
@@ -98,7 +99,7 @@ def _filtered(
     turns: GearTurns,
     mesh_frequency: float,
     sampling_rate: float,
-    inverse: NDArray[np.float64],
+    inverse: Array,
 ) -> GearTurns:
     """Turns through a filter (sample,) at the sampling rate."""
     n_samples = turns.mesh.shape[-1]
@@ -116,9 +117,7 @@ def _filtered(
     )
 
 
-def _answer(
-    inverse: NDArray[np.float64], share: FloatArray
-) -> NDArray[np.complexfloating]:
+def _answer(inverse: Array, share: FloatArray) -> NDArray[np.complexfloating]:
     """Frequency response at shares of the sampling rate; 0 from half of it on."""
     step = np.exp(-2j * np.pi * share)
     answer = np.polynomial.polynomial.polyval(step, inverse)

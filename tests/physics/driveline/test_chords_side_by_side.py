@@ -16,13 +16,11 @@ from side_by_side_lines import (
 )
 
 import gensig
-from gensig.driveline.reading import read_line_machine
+from gensig import load_system
 from gensig.dynamics.backends.nystroem import machine_lanes
 from gensig.dynamics.decimation import in_band_error
 from gensig.faults.broken import MissingTooth
-from gensig.plan.request import read_request
 from gensig.systems.pair_machine import running_pair
-from gensig.systems.registry import read_system
 from gensig.systems.run import Run, Start
 
 SHORT = (
@@ -59,14 +57,14 @@ SLANTED = (
 
 def line(*words):
     """A line machine by overrides."""
-    return read_line_machine(read_request([*words]).config)
+    return load_system(*words)
 
 
 @pytest.mark.parametrize("words", [CROWNED, SLANTED], ids=["crowned", "helical"])
 @pytest.mark.parametrize("faults", [(), MISSING], ids=["sound", "missing"])
 def test_a_pair_with_chords_as_a_line_moves_as_the_pair(faults, words):
     """Crowned spur slices, and teeth that move the gears along their axes and tilt them."""
-    system = read_system(read_request([*words]).config)
+    system = load_system(*words)
     start = Start(tooth_pinion=3, tooth_wheel=5, phase=0.3)
     run = Run(system=system, faults=faults, start=start, specimen=specimen_of(system))
     pair = running_pair(run)

@@ -5,6 +5,7 @@ import pytest
 from closeness import assert_close
 from engine_cases import SPEED, TORQUE
 from numpy.testing import assert_allclose
+from refusals import refused
 
 from gensig.driveline.engine_dampers import (
     ToothLoad,
@@ -17,7 +18,6 @@ from gensig.driveline.engine_dampers import (
 )
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.linear.dampers import TorsionalDamper
-from gensig.errors import ConfigError
 from gensig.options.compose import compose
 
 ENGINE = ("system=engine_gear_train", "excitation=engine_v20")
@@ -146,8 +146,5 @@ def test_a_force_that_never_closes_the_mesh_is_refused(config, line):
     strength = read_mesh_strength(config, line, mesh)
     load = ToothLoad(speed=SPEED, force=np.full(8, -1.0))
 
-    with pytest.raises(
-        ConfigError,
-        match="its force never closes the driving flanks",
-    ):
+    with refused("its force never closes the driving flanks"):
         dynamic_root_stress(strength, line, mesh, load)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from closeness import assert_close
 from engine_cases import RPM, SPEED
+from refusals import refused
 
 from gensig.driveline.engine_dampers import (
     ToothLoad,
@@ -20,7 +21,6 @@ from gensig.driveline.in_time import RATE, TimeResponse
 from gensig.driveline.linear.forced import run_of_speeds
 from gensig.driveline.sweep import amplitude_spectra, sweep_course, sweep_response
 from gensig.driveline.time_root_stress import root_stress_in_time, typical_largest
-from gensig.errors import ConfigError
 from gensig.options.compose import compose
 
 ENGINE = ("system=engine_gear_train", "excitation=engine_v20")
@@ -102,7 +102,7 @@ def test_the_course_goes_up_and_comes_back():
             650,
             1750,
             0.2,
-            r"too few cycles at its low end; give 0\.81 s or more",
+            "too few cycles at its low end; give 0.81 s or more",
         ),
         (
             1750,
@@ -113,7 +113,7 @@ def test_the_course_goes_up_and_comes_back():
     ],
 )
 def test_speeds_that_make_no_sweep_are_refused(low, high, seconds, message):
-    with pytest.raises(ConfigError, match=message):
+    with refused(message):
         sweep_response(
             engine(),
             low * RPM,
@@ -218,5 +218,5 @@ def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle(pump_d
 def test_a_run_without_root_stress_is_refused(pump_drive, force, n_cycles, message):
     line, mesh, strength = pump_drive
     response = motion(SPEED, np.full(64, force), n_cycles)
-    with pytest.raises(ConfigError, match=message):
+    with refused(message):
         root_stress_in_time(strength, line, mesh, response)

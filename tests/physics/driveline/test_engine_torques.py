@@ -2,8 +2,6 @@
 refused.
 """
 
-import re
-
 import numpy as np
 import pytest
 from closeness import assert_close
@@ -16,6 +14,7 @@ from engine_cases import (
     ratios,
     torques_of,
 )
+from refusals import given, refused
 
 from gensig.driveline.excitation.cycle import CYCLE
 from gensig.driveline.excitation.engine import read_engine, read_wheels
@@ -223,166 +222,76 @@ def test_torques_that_contradict_the_pressure_are_refused(tmp_path):
             torques_of(values, torque=torque)
 
 
-@pytest.mark.parametrize(
-    ("path", "value", "message"),
-    [
-        (
-            "throw_nodes",
-            [13, 12],
-            "excitation.throw_nodes has 2 different nodes for 10 throws",
-        ),
-        (
-            "throw_nodes",
-            [13, 13, 11, 10, 9, 8, 7, 6, 5, 4],
-            "excitation.throw_nodes has 9 different nodes for 10 throws",
-        ),
-        (
-            "throw_nodes",
-            [99, 12, 11, 10, 9, 8, 7, 6, 5, 4],
-            "excitation.throw_nodes: the shaft line has no node 99",
-        ),
-        (
-            "throw_nodes",
-            [20, 12, 11, 10, 9, 8, 7, 6, 5, 4],
-            "node 20 turns 0.5 times as fast as the crank; it needs 1",
-        ),
-        (
-            "throw_nodes",
-            [1.5],
-            "excitation.throw_nodes = [1.5] is not a list of whole numbers",
-        ),
-        (
-            "valve_nodes.A",
-            [1, 2],
-            "excitation.valve_nodes.A has 2 nodes for 10 throws",
-        ),
-        (
-            "valve_nodes.A",
-            [67] * 10,
-            "node 67 turns 1.475 times as fast as the crank; it needs 0.5",
-        ),
-        (
-            "valve_nodes.C",
-            [],
-            "excitation.valve_nodes: no bank 'C'; there are A, B",
-        ),
-        (
-            "valves.intake.cam.lift_mm",
-            0,
-            "excitation.valves.intake.cam.lift_mm = 0 must be positive",
-        ),
-        (
-            "valves.intake.cam",
-            3,
-            "excitation.valves.intake.cam = 3 must be a group of keys",
-        ),
-        (
-            "valves.intake.open_deg",
-            3,
-            "excitation.valves.intake: unknown key 'open_deg'; did you mean 'opening_deg'?",
-        ),
-        (
-            "injection_pump.cylinders",
-            ["A1"],
-            "excitation.injection_pump.cylinders must name a different cylinder",
-        ),
-        (
-            "injection_pump.nodes",
-            "46",
-            "excitation.injection_pump.nodes = '46' is not a list of whole numbers",
-        ),
-        (
-            "injection_pump.cam.follower",
-            1,
-            "excitation.injection_pump.cam.follower = 1 is not text",
-        ),
-        (
-            "injection_pump.diameter_cm",
-            1,
-            "unknown key 'diameter_cm'; did you mean 'diameter_mm'?",
-        ),
-        (
-            "loads.fresh_water_pump.node",
-            99,
-            "excitation.loads.fresh_water_pump.node: the shaft line has no node 99",
-        ),
-        (
-            "loads.fresh_water_pump.law",
-            "cubic",
-            "excitation.loads.fresh_water_pump.law = 'cubic'; allowed: constant",
-        ),
-        (
-            "loads.fresh_water_pump.torque_nm",
-            -1,
-            "excitation.loads.fresh_water_pump.torque_nm = -1 must not be",
-        ),
-        (
-            "dynamometer.node",
-            99,
-            "excitation.dynamometer.node: the shaft line has no node 99",
-        ),
-        (
-            "dynamometer.disturbance_share",
-            2,
-            "excitation.dynamometer.disturbance_share = 2 must lie in 0..1",
-        ),
-        (
-            "dynamometer.disturbance_frequency_hz",
-            0,
-            "disturbance_frequency_hz = 0 must be positive",
-        ),
-        (
-            "reference.speed_rpm",
-            0,
-            "excitation.reference: speed_rpm and torque_nm must be positive",
-        ),
-        (
-            "friction_mean_pressure_mpa",
-            -1,
-            "excitation.friction_mean_pressure_mpa = -1 must not be negative",
-        ),
-        (
-            "friction_mean_pressure_mpa",
-            "much",
-            "excitation.friction_mean_pressure_mpa = 'much' is not a number",
-        ),
-        (
-            "pressure.file",
-            3,
-            "excitation.pressure.file = 3 is not text",
-        ),
-        (
-            "pressure.kind",
-            "otto",
-            "excitation.pressure: unknown key 'kind'",
-        ),
-        (
-            "pressure.boost_pressure",
-            1,
-            "'boost_pressure' has the wrong unit; write it as 'boost_pressure_mpa'",
-        ),
-        (
-            "kind",
-            "motor",
-            "excitation.kind = 'motor'; allowed: engine",
-        ),
-        ("sound", 1, "excitation: unknown key 'sound'"),
-        (
-            "cylinder.bore_mm",
-            "wide",
-            "excitation.cylinder.bore_mm = 'wide' is not a number",
-        ),
-        (
-            "layout.firing_order",
-            ["A1"] * 20,
-            "excitation.layout.firing_order repeats A1 (places 1 and 2)",
-        ),
-    ],
-)
-def test_impossible_engines_are_refused_in_one_line(path, value, message):
-    with pytest.raises(ConfigError, match=re.escape(message)) as caught:
+REFUSED = {
+    "throw_nodes=[13,12]": "excitation.throw_nodes has 2 different nodes for 10 throws",
+    "throw_nodes=[13,13,11,10,9,8,7,6,5,4]": (
+        "excitation.throw_nodes has 9 different nodes for 10 throws"
+    ),
+    "throw_nodes=[99,12,11,10,9,8,7,6,5,4]": (
+        "excitation.throw_nodes: the shaft line has no node 99"
+    ),
+    "throw_nodes=[20,12,11,10,9,8,7,6,5,4]": (
+        "node 20 turns 0.5 times as fast as the crank; it needs 1"
+    ),
+    "throw_nodes=[1.5]": "excitation.throw_nodes = [1.5] is not a list of whole numbers",
+    "valve_nodes.A=[1,2]": "excitation.valve_nodes.A has 2 nodes for 10 throws",
+    "valve_nodes.A=[67,67,67,67,67,67,67,67,67,67]": (
+        "node 67 turns 1.475 times as fast as the crank; it needs 0.5"
+    ),
+    "valve_nodes.C=[]": "excitation.valve_nodes: no bank 'C'; there are A, B",
+    "valves.intake.cam.lift_mm=0": "excitation.valves.intake.cam.lift_mm = 0 must be positive",
+    "valves.intake.cam=3": "excitation.valves.intake.cam = 3 must be a group of keys",
+    "valves.intake.open_deg=3": (
+        "excitation.valves.intake: unknown key 'open_deg'; did you mean 'opening_deg'?"
+    ),
+    'injection_pump.cylinders=["A1"]': (
+        "excitation.injection_pump.cylinders must name a different cylinder"
+    ),
+    "injection_pump.nodes='46'": (
+        "excitation.injection_pump.nodes = '46' is not a list of whole numbers"
+    ),
+    "injection_pump.cam.follower=1": "excitation.injection_pump.cam.follower = 1 is not text",
+    "injection_pump.diameter_cm=1": "unknown key 'diameter_cm'; did you mean 'diameter_mm'?",
+    "loads.fresh_water_pump.node=99": (
+        "excitation.loads.fresh_water_pump.node: the shaft line has no node 99"
+    ),
+    "loads.fresh_water_pump.law='cubic'": (
+        "excitation.loads.fresh_water_pump.law = 'cubic'; allowed: constant"
+    ),
+    "loads.fresh_water_pump.torque_nm=-1": (
+        "excitation.loads.fresh_water_pump.torque_nm = -1 must not be"
+    ),
+    "dynamometer.node=99": "excitation.dynamometer.node: the shaft line has no node 99",
+    "dynamometer.disturbance_share=2": (
+        "excitation.dynamometer.disturbance_share = 2 must lie in 0..1"
+    ),
+    "dynamometer.disturbance_frequency_hz=0": "disturbance_frequency_hz = 0 must be positive",
+    "reference.speed_rpm=0": "excitation.reference: speed_rpm and torque_nm must be positive",
+    "friction_mean_pressure_mpa=-1": (
+        "excitation.friction_mean_pressure_mpa = -1 must not be negative"
+    ),
+    "friction_mean_pressure_mpa='much'": (
+        "excitation.friction_mean_pressure_mpa = 'much' is not a number"
+    ),
+    "pressure.file=3": "excitation.pressure.file = 3 is not text",
+    "pressure.kind='otto'": "excitation.pressure: unknown key 'kind'",
+    "pressure.boost_pressure=1": (
+        "'boost_pressure' has the wrong unit; write it as 'boost_pressure_mpa'"
+    ),
+    "kind='motor'": "excitation.kind = 'motor'; allowed: engine",
+    "sound=1": "excitation: unknown key 'sound'",
+    "cylinder.bore_mm='wide'": "excitation.cylinder.bore_mm = 'wide' is not a number",
+    "layout.firing_order=[" + "'A1'," * 20 + "]": (
+        "excitation.layout.firing_order repeats A1 (places 1 and 2)"
+    ),
+}
+
+
+@pytest.mark.parametrize(("change", "message"), REFUSED.items())
+def test_impossible_engines_are_refused_in_one_line(change, message):
+    ((path, value),) = given(change).items()
+    with refused(message):
         torques_of(changed(path, value))
-    assert "\n" not in str(caught.value)
 
 
 def test_toothed_wheels_are_read_by_name():
@@ -401,19 +310,16 @@ def test_toothed_wheels_are_read_by_name():
         (without_node, ": missing node"),
     ):
         place = "excitation.toothed_wheels.flywheel"
-        with pytest.raises(ConfigError, match=re.escape(place + message)):
+        with refused(place + message):
             read_wheels(values)
 
 
 def test_missing_keys_are_named():
     values = option()
     del values["loads"]
-    with pytest.raises(ConfigError, match="excitation: missing loads"):
+    with refused("excitation: missing loads"):
         read_engine(values)
-    with pytest.raises(
-        ConfigError,
-        match="excitation = 3 must be a group of keys",
-    ):
+    with refused("excitation = 3 must be a group of keys"):
         read_engine(3)
 
 

@@ -9,13 +9,13 @@ from closeness import assert_close
 from line_tools import IMPLICIT
 from refusals import refused
 
+from gensig import load_system
 from gensig.driveline.teeth import felt_there, is_tabulated
 from gensig.driveline.time.newmark import LineSolver
 from gensig.errors import FaultError
 from gensig.faults.registry import read_faults
 from gensig.plan.request import read_request
 from gensig.record.inputs import draw_start
-from gensig.record.machines import read_machine
 from gensig.sensing.chain import Sensing
 from gensig.sensing.manufacturing import (
     GearErrors,
@@ -46,7 +46,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*mean tooth forces:UserWarning"
 
 @lru_cache(maxsize=16)
 def machine(*words):
-    return read_machine(read_request(list(words)).config)
+    return load_system(*words)
 
 
 def crack(gear, tooth=0, depth=1.5):
@@ -148,7 +148,7 @@ def test_all_teeth_turn_back_with_a_lead_in(words, n_lead, monkeypatch):
     monkeypatch.setattr(Sensing, "n_lead", n_lead)
     for seed in range(3):
         start = draw_start(record, np.random.default_rng(seed))
-        run = Run(system=record, faults=(), start=start)
+        run = Run(system=record, start=start)
         whole, late = earlier(run), record.line(run)
         early = whole.system.line(whole)
         turned = (
@@ -174,7 +174,7 @@ def test_a_start_decides_the_teeth_of_all_gears():
     record = machine(*TWO_STAGE)
 
     def teeth(**start):
-        line = record.line(Run(system=record, faults=(), start=Start(**start)))
+        line = record.line(Run(system=record, start=Start(**start)))
         return line.dynamics.teeth[1].start_teeth
 
     assert teeth(tooth_wheel=3) == teeth(tooth_wheel=3)
@@ -200,7 +200,7 @@ def specimen_of(record, seed=0):
 def test_every_gear_has_its_errors_in_its_mesh():
     record = machine(*TWO_STAGE)
     specimen = specimen_of(record)
-    line = record.line(Run(system=record, faults=(), specimen=specimen))
+    line = record.line(Run(system=record, specimen=specimen))
     stage = line.dynamics.teeth[1]
     names = ("idler_gear_2", OUTPUT)
     for error, tilt, name in zip(stage.errors, stage.tilts, names, strict=True):
@@ -208,7 +208,7 @@ def test_every_gear_has_its_errors_in_its_mesh():
         assert np.ptp(error) > 1e-6
         np.testing.assert_array_equal(tilt, specimen.others[name].tilt)
         assert np.ptp(tilt) > 1e-5
-    nominal = record.line(Run(system=record, faults=())).dynamics.teeth[1]
+    nominal = record.line(Run(system=record)).dynamics.teeth[1]
     assert not np.any(nominal.errors[0])
     factor = specimen.mountings[0].backlash_factor
     assert_close(stage.pair.backlash, factor * nominal.pair.backlash, 1e-9)
@@ -223,7 +223,7 @@ def test_errors_of_an_idler_stay_on_the_flanks_of_its_home_mesh():
     """
     record = machine(*ENGINE, "system.record_mesh=[3,18]")
     specimen = specimen_of(record)
-    line = record.line(Run(system=record, faults=(), specimen=specimen))
+    line = record.line(Run(system=record, specimen=specimen))
     errors = {
         name: mesh.errors
         for name, mesh in zip(
@@ -273,8 +273,8 @@ def test_supports_of_all_gears_scatter_with_the_gearbox():
     record = machine(*TWO_STAGE)
     quality = replace(record.quality, support_stiffness_scatter=0.2)
     gearbox = draw_gearbox(np.random.default_rng(0), 4, quality, 0.0, n_gears=4)
-    nominal = record.line(Run(system=record, faults=()))
-    line = record.line(Run(system=record, faults=(), gearbox=gearbox))
+    nominal = record.line(Run(system=record))
+    line = record.line(Run(system=record, gearbox=gearbox))
     names = [gear.name for gear in record.engine.drive.line.gears]
     at = [
         nominal.matrices.names.index(f"{name} {axis}")
@@ -285,7 +285,7 @@ def test_supports_of_all_gears_scatter_with_the_gearbox():
     assert_close(ratio, gearbox.stiffness_factor, 1e-9)
     # a gearbox that knows two gears leaves the others as they are
     two = replace(nominal_gearbox(4), stiffness_factor=gearbox.stiffness_factor[:4])
-    line = record.line(Run(system=record, faults=(), gearbox=two))
+    line = record.line(Run(system=record, gearbox=two))
     ratio = line.matrices.stiffness[at, at] / nominal.matrices.stiffness[at, at]
     assert_close(ratio[:4], gearbox.stiffness_factor[:4], 1e-9)
     assert_close(ratio[4:], np.ones(4), 1e-12)

@@ -17,6 +17,7 @@ from engine_cases import (
     response_of,
     torques_of,
 )
+from refusals import refused
 
 from gensig.driveline.excitation.cycle import cycle_angles
 from gensig.driveline.linear.forced import (
@@ -168,9 +169,9 @@ def test_mean_torques_are_carried_through_and_must_balance():
     assert abs(np.sum(np.diag(line.mass) * computed.twist)) < 1e-12
 
     torque[2] += 1.0
-    with pytest.raises(
+    with refused(
+        "the mean torques leave 0.5774 N m on a line that nothing holds",
         SimulationError,
-        match=r"the mean torques leave 0.5774 N m on a line that nothing holds",
     ):
         steady_response(line, torque, 60.0, n_orders=12)
 
@@ -276,18 +277,18 @@ def test_matrices_and_orders_that_make_no_line_are_refused():
     line, _ = chain()
     skew = line.stiffness + np.eye(3, k=1)
     torque = np.zeros((3, 64))
-    for refused, message in (
+    for impossible, message in (
         (
             lambda: replace(line, stiffness=skew),
             "stiffness must be symmetric",
         ),
         (
             lambda: replace(line, loss=np.zeros((2, 2))),
-            r"loss \(2, 2\) must be a finite matrix \(3, 3\)",
+            "loss (2, 2) must be a finite matrix (3, 3)",
         ),
         (
             lambda: cycle_orders(torque, 40),
-            r"n_orders = 40 must lie in 1\.\.31",
+            "n_orders = 40 must lie in 1..31",
         ),
         (
             lambda: over_cycle(np.zeros((3, 12), dtype=complex), 24),
@@ -298,14 +299,11 @@ def test_matrices_and_orders_that_make_no_line_are_refused():
             "must be positive",
         ),
     ):
-        with pytest.raises(ValueError, match=message):
-            refused()
+        with refused(message, ValueError):
+            impossible()
     one = np.eye(1)
     zero = np.zeros((1, 1))
     undamped = LinearSystem(mass=one, stiffness=one, loss=zero, damping=zero)
 
-    with pytest.raises(
-        SimulationError,
-        match="excited at its natural frequency",
-    ):
+    with refused("excited at its natural frequency", SimulationError):
         undamped.response(np.ones((1, 1), dtype=complex), np.array([1.0]))

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from closeness import assert_close
 from engine_cases import SPEED, TORQUE
+from refusals import refused
 
+from gensig import load_system
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.in_time import read_tooth_law, tabulated_meshes
 from gensig.driveline.mesh_phase import first_slice_lead, start_phases, start_rolls
@@ -17,10 +19,8 @@ from gensig.driveline.running import Governor, running_line, steady_course
 from gensig.driveline.teeth import ToothStart, neighbours, tooth_there
 from gensig.driveline.time.newmark import LineSolver
 from gensig.dynamics.mesh_teeth import mean_mesh_stiffness
-from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.plan.request import read_request
-from gensig.record.machines import read_machine
 from gensig.systems.run import Run, Start
 
 GOVERNOR = Governor(frequency=1.0, damping_ratio=0.7)
@@ -41,7 +41,7 @@ SIDES = ("pinion", "wheel")
 
 @lru_cache(maxsize=8)
 def machine(*words):
-    return read_machine(read_request([*RECORDS, *words]).config)
+    return load_system(*RECORDS, *words)
 
 
 def line_with(fault, *words):
@@ -252,7 +252,7 @@ def test_meshes_stand_where_the_crank_puts_them(tooth, phase):
     start = Start(tooth_pinion=tooth, tooth_wheel=3, phase=phase)
     turned = record.crank_angle(start)
     rolls = start_rolls(drive, turned)
-    line = record.line(Run(system=record, faults=(), start=start)).dynamics
+    line = record.line(Run(system=record, start=start)).dynamics
 
     off = [start_phases(drive, turned)[record.mesh_number] - phase]
     for teeth, pair, roll in zip(line.teeth, drive.pairs, rolls, strict=True):
@@ -263,14 +263,8 @@ def test_meshes_stand_where_the_crank_puts_them(tooth, phase):
 
 
 def test_slices_in_phase_are_refused():
-    record = read_machine(
-        read_request(
-            [
-                *RECORDS,
-                "system.record_mesh=[3,66]",
-                "mesh.slices_in_phase=true",
-            ]
-        ).config
+    record = load_system(
+        *RECORDS, "system.record_mesh=[3,66]", "mesh.slices_in_phase=true"
     )
-    with pytest.raises(ConfigError, match="a line has the helix in"):
+    with refused("a line has the helix in"):
         record.check()

@@ -9,11 +9,11 @@ import numpy as np
 from closeness import assert_close
 from engine_cases import SPEED, TORQUE
 
+from gensig import load_system
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.running import Governor, running_line, steady_course
 from gensig.driveline.time.newmark import LineSolver
 from gensig.plan.request import read_request
-from gensig.record.machines import read_machine
 from gensig.sensing.manufacturing import nominal_gearbox
 from gensig.systems.run import Run
 
@@ -41,7 +41,7 @@ def engine(*words):
 
 
 def machine(*words):
-    return read_machine(read_request([*RECORDS, *words]).config)
+    return load_system(*RECORDS, *words)
 
 
 def deviations(line, nodes, settling, duration=0.15):
@@ -138,7 +138,7 @@ def test_a_fine_wheel_without_errors_shows_the_shaft():
         )
     ]
     record = machine(*words, "sensing.channels=[flywheel_speed]")
-    line = record.line(Run(system=record, faults=()))
+    line = record.line(Run(system=record))
     motion = line.run(
         SOLVER,
         duration=0.08,
@@ -157,7 +157,7 @@ def test_supports_of_a_gearbox_reach_the_lateral_line():
         "system.lateral=true",
         "sensing.channels=[wheel_x, wheel_y]",
     )
-    run = Run(system=record, faults=())
+    run = Run(system=record)
     nominal = record.line(run)
     stiffer = replace(
         nominal_gearbox(2),

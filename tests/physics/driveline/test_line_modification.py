@@ -8,12 +8,10 @@ import pytest
 from fault_cases import side_of
 from numpy.testing import assert_allclose
 
-from gensig import configs
+from gensig import configs, load_system
 from gensig.driveline.teeth import modified_there
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.modification import FlankModification
-from gensig.plan.request import read_request
-from gensig.record.machines import read_machine
 from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.sliced_pair import SlicedPair
 
@@ -29,7 +27,7 @@ RELIEF = (
 
 
 def line(*words):
-    return read_machine(read_request([*SHORT, *words]).config)
+    return load_system(*SHORT, *words)
 
 
 def assert_same_tables(one, other):
@@ -46,7 +44,7 @@ def assert_same_tables(one, other):
 
 def test_spur_teeth_are_those_of_a_pair():
     machine = line("system=two_stage_gearbox", *RELIEF)
-    pair = read_machine(read_request([*SHORT]).config)
+    pair = load_system(*SHORT)
     pair = replace(
         pair,
         pair=machine.pair,
@@ -80,7 +78,7 @@ def test_helical_teeth_are_those_of_a_pair():
 def test_long_reliefs_of_a_stage_even_its_transmission_error():
     """Welbourn's long reliefs for the force of the mesh, cut on the line's gears."""
     plain = line("system=two_stage_gearbox")
-    pair = read_machine(read_request([*SHORT]).config)
+    pair = load_system(*SHORT)
     torque = plain.mesh_force * plain.pair.pinion.base_radius
     pair = replace(
         pair, pair=plain.pair, operating=replace(pair.operating, torque=torque)

@@ -11,14 +11,13 @@ import pytest
 from closeness import assert_close
 from line_tools import IMPLICIT
 
+from gensig import load_system
 from gensig.driveline.line_gears import gear_dof
 from gensig.driveline.mesh_phase import start_phases
 from gensig.driveline.running import Governor, running_line, steady_course
 from gensig.driveline.time.newmark import LineSolver
 from gensig.dynamics.motion.course import LineCourse, ShaftTorque
 from gensig.dynamics.response import GEAR_AXES
-from gensig.plan.request import read_request
-from gensig.record.machines import read_machine
 from gensig.systems.lead_in import earlier, simulate_with_lead_in
 from gensig.systems.run import Run, Start
 
@@ -33,7 +32,7 @@ RATE = 10240.0
 
 @lru_cache(maxsize=8)
 def machine(*words):
-    return read_machine(read_request(list(words)).config)
+    return load_system(*words)
 
 
 def unfiltered(system):
@@ -93,7 +92,7 @@ def test_names_follow_the_recorded_mesh_and_the_motion_does_not():
 def test_a_lead_in_turns_every_mesh_back(words):
     system = machine(*words)
     start = Start(tooth_pinion=30, tooth_wheel=17, phase=0.3)
-    run = Run(system=system, faults=(), start=start)
+    run = Run(system=system, start=start)
     led = earlier(run)
     lead = system.sensing.n_lead / system.sensing.sampling_rate
     assert lead > 0.09
@@ -118,7 +117,7 @@ def test_a_lead_in_turns_every_mesh_back(words):
 def test_a_record_without_its_lead_in_is_the_record():
     system = machine(*MOTOR, BEARINGS, FILTERED)
     start = Start(tooth_pinion=5, tooth_wheel=17, phase=0.3)
-    run = Run(system=system, faults=(), start=start)
+    run = Run(system=system, start=start)
     (led,) = simulate_with_lead_in([run])
     (plain,) = simulate_with_lead_in([replace(run, system=unfiltered(system))])
     kept = led.acceleration[:, system.sensing.n_lead :]
@@ -134,7 +133,7 @@ def test_the_angle_of_every_gear_says_where_its_teeth_are():
     system = machine(*MOTOR, BEARINGS)
     places = []
     for start in (Start(), Start(tooth_pinion=5, tooth_wheel=17, phase=0.3)):
-        line = system.line(Run(system=system, faults=(), start=start))
+        line = system.line(Run(system=system, start=start))
         pitches = rolls(line)[1]
         (angle,) = system.gear_angle("idler_gear_2", start, np.zeros(1))
         (driven,) = system.gear_angle("output_gear", start, np.zeros(1))
@@ -151,7 +150,7 @@ def test_the_angle_of_every_gear_says_where_its_teeth_are():
 
 
 def linear(system):
-    return system.linear_machine(Run(system=system, faults=()))
+    return system.linear_machine(Run(system=system))
 
 
 def test_a_toothed_wheel_answers_with_the_speed_of_its_shaft():

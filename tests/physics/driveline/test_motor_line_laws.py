@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from closeness import assert_close
 from line_tools import IMPLICIT
+from refusals import refused
 
+from gensig import load_system
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.time.newmark import LineSolver, integrate_line
 from gensig.errors import StepError
 from gensig.faults.registry import read_faults
 from gensig.plan.request import read_request
-from gensig.record.machines import read_machine
 from gensig.systems.run import Run, Start
 
 RPM = np.pi / 30.0
@@ -51,7 +52,7 @@ def driven(*words):
 
 
 def machine(*words):
-    return read_machine(read_request([*RECORDS, *words]).config)
+    return load_system(*RECORDS, *words)
 
 
 def simulated(record, *faults, start=None):
@@ -101,7 +102,7 @@ def test_power_in_is_power_out_and_losses(share):
 def test_in_time_the_mean_forces_stay_and_the_energies_balance(friction):
     """With friction a mesh also carries what the meshes behind it lose, under a hundredth each."""
     record = machine("operating.duration_s=1", f"mesh.friction_coefficient={friction}")
-    line = record.line(Run(system=record, faults=()))
+    line = record.line(Run(system=record))
     channels = [
         ("mesh_force", 0),
         ("mesh_force", 1),
@@ -132,7 +133,7 @@ def test_energies_balance_where_steps_meet_every_pitch_at_the_same_places(speed_
         "operating.duration_s=0.3",
         f"operating.speed_rpm={speed_rpm}",
     )
-    motion = record.line(Run(system=record, faults=())).run(
+    motion = record.line(Run(system=record)).run(
         SOLVER,
         duration=0.3,
         channels=[("mesh_force", 0)],
@@ -147,11 +148,11 @@ def test_a_record_whose_steps_are_too_long_is_made_with_half_of_them():
         "operating.duration_s=0.05",
     ]
     short, long = (machine(*words, f"solver.oversampling={steps}") for steps in (8, 4))
-    line = long.line(Run(system=long, faults=()))
+    line = long.line(Run(system=long))
     coarse = replace(SOLVER, oversampling=4)
     record = {"duration": 0.05, "channels": [("speed", 0)]}
 
-    with pytest.raises(StepError, match="the energy balance misses"):
+    with refused("the energy balance misses", StepError):
         integrate_line(
             line.dynamics,
             coarse,
@@ -196,7 +197,7 @@ def test_a_run_up_follows_its_course_and_its_load_the_law(law, exponent):
         "operating.torque_nm=60",
         "operating.duration_s=0.4",
     )
-    line = record.line(Run(system=record, faults=()))
+    line = record.line(Run(system=record))
     load = "angle", line.dof(8)
     channels = [load, ("mesh_force", 0)]
     motion = line.run(SOLVER, duration=0.4, channels=channels, settling=0.3)

@@ -16,6 +16,7 @@ from side_by_side_lines import (
     with_solver,
 )
 
+from gensig import load_system
 from gensig.driveline.reading import read_line_machine
 from gensig.dynamics.decimation import in_band_error
 from gensig.errors import SimulationError
@@ -85,13 +86,13 @@ def test_a_pair_with_errors_of_manufacture_moves_as_the_pair(machine):
 @pytest.fixture(scope="module")
 def two_stage():
     """A two-stage gearbox with lateral motion, as its experiment has it."""
-    return read_line_machine(read_request(list(TWO_STAGE)).config)
+    return load_system(*TWO_STAGE)
 
 
 @pytest.fixture(scope="module", params=BOXES)
 def box(request):
     """A two-stage gearbox of spur and one of helical gears."""
-    return read_line_machine(read_request(list(BOXES[request.param])).config)
+    return load_system(*BOXES[request.param])
 
 
 def test_two_stages_are_accurate_to_a_thousandth(box):
@@ -128,7 +129,7 @@ def test_two_stages_agree_with_the_implicit_method(kind, grade, more, limit):
     words = [*BOXES[kind], *NO_LOSS, *more, channels]
     if grade is not None:
         words.append(f"quality.iso1328_grade={grade}")
-    machine = read_line_machine(read_request(words).config)
+    machine = load_system(*words)
     specimen = None
     if grade is not None:
         specimen = specimen_of(machine)
@@ -148,10 +149,7 @@ def test_two_stages_agree_with_the_implicit_method(kind, grade, more, limit):
 def test_a_torque_ripple_moves_the_gears_as_the_linear_line():
     """By as many waves a turn of the motor as it has, as strongly as with meshes held."""
     words = [*LOSSLESS, "sensing.channels=[pinion_rotation]"]
-    machines = [
-        read_line_machine(read_request([*words, *more]).config)
-        for more in ((), (RIPPLE,))
-    ]
+    machines = [load_system(*words, *more) for more in ((), (RIPPLE,))]
     plain, rippled = (
         record.acceleration[0] for record in recorded(*map(run_of, machines))
     )
@@ -168,7 +166,7 @@ def test_a_torque_ripple_moves_the_gears_as_the_linear_line():
 
 def test_torques_over_an_angle_know_no_neighbours_and_no_precision():
     """Machines of other torques and speeds side by side, each as alone, and in float32."""
-    machine = read_line_machine(read_request([*TWO_STAGE, RIPPLE]).config)
+    machine = load_system(*TWO_STAGE, RIPPLE)
     slower = replace(
         machine, operating=replace(machine.operating, speed=90.0, torque=20.0)
     )
@@ -271,7 +269,7 @@ def test_the_loads_of_every_mesh_are_known(two_stage):
 @pytest.mark.parametrize(("kind", "limit"), [("spur", 0.01), ("helical", 1e-3)])
 def test_the_loads_are_the_same_by_the_implicit_method(kind, limit):
     """Of both meshes: forces, teeth and their shares."""
-    machine = read_line_machine(read_request([*BOXES[kind], *NO_LOSS]).config)
+    machine = load_system(*BOXES[kind], *NO_LOSS)
     slow = with_solver(machine, backend="newmark", oversampling=40)
     runs = [run_of(each, with_mesh_state=True) for each in (machine, slow)]
     ours, theirs = recorded(*runs)
@@ -292,9 +290,7 @@ def test_the_loads_are_the_same_by_the_implicit_method(kind, limit):
 
 def test_the_loads_are_the_same_whichever_mesh_is_followed(two_stage):
     """The second mesh of a record that follows the first one is that of one that follows it."""
-    other = read_line_machine(
-        read_request([*TWO_STAGE, "system.record_mesh=[5,6]"]).config
-    )
+    other = load_system(*TWO_STAGE, "system.record_mesh=[5,6]")
     run = run_of(two_stage, with_mesh_state=True)
     stage = two_stage.line(run).dynamics.teeth[1]
     start = Start(

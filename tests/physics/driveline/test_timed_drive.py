@@ -4,6 +4,7 @@ are put on anew.
 
 import pytest
 
+from gensig import load_system
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.inputs import draw_start
@@ -24,7 +25,7 @@ def test_the_pump_gear_meets_the_same_tooth_at_the_same_firing(engine):
 
 
 def test_a_pair_without_timing_is_put_on_anew():
-    machine = read_machine(read_request([]).config)
+    machine = load_system()
     assert machine.driven_tooth(7, 30) == 30
 
 

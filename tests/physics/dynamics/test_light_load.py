@@ -7,10 +7,9 @@ import pytest
 from plain_motion import at_rest, equations, solved
 from scipy.signal import decimate
 
+from gensig import load_system
 from gensig.faults.broken import MissingTooth
-from gensig.plan.request import read_request
 from gensig.systems.pair_machine import running_pair
-from gensig.systems.registry import read_system
 from gensig.systems.run import Run, Start
 
 RATE, PER_SAMPLE = 51200, 4
@@ -32,7 +31,7 @@ PAPERS = (
 @cache
 def level(prescribed, by_stiffness):
     """RMS of pinion_y, m/s2."""
-    system = read_system(read_request([*PAPERS]).config)
+    system = load_system(*PAPERS)
     missing = MissingTooth(gear="pinion", tooth=3)
     start = Start(tooth_pinion=3, tooth_wheel=5, phase=0.3)
     running = running_pair(Run(system=system, faults=(missing,), start=start))

@@ -83,7 +83,6 @@ def at(machine):
         operating = replace(system.operating, **courses)
         return Run(
             system=replace(system, operating=operating),
-            faults=(),
             start=start,
         )
 

@@ -37,7 +37,6 @@ def run(machine):
     def make(changes, **more):
         return Run(
             system=machine({**PLAIN, **changes}),
-            faults=(),
             **more,
         )
 

@@ -271,16 +271,3 @@ def test_pairs_take_a_composed_configuration():
     before = json.dumps(config.plain())
     make_pairs(config, speeds_rpm=[1800], torques_nm=[20], n_units=4)
     assert json.dumps(config.plain()) == before
-
-
-@pytest.mark.parametrize(
-    ("words", "answer"),
-    [
-        ("--speeds 900 900", "speeds in r/min: 900, 900; give positive numbers"),
-        ("--torques 20 20", "torques in N m: 20, 20; give positive numbers"),
-    ],
-)
-def test_speeds_and_torques_are_lists_of_different_numbers(words, answer, capsys):
-    assert main(["detectability", "fault=crack", *words.split()]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert answer in line

@@ -86,23 +86,6 @@ def test_the_command_writes_table_and_figure(tmp_path, capsys):
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize(
-    ("words", "answer"),
-    [
-        ("fault=missing_tooth --snrs 10", "fault=missing_tooth has no single size"),
-        ("fault=crack --sizes 1 1", "--sizes: 1, 1; give numbers, each once"),
-        ("fault=crack --sizes 0 1", "crack_depth_mm = 0"),
-        ("fault=crack --snrs 10 --speeds 900", "give operating.speed_rpm=RPM"),
-        ("fault=crack --sizes 1 fault.crack_depth_mm=2", "given twice"),
-        ("fault=crack --sizes deep", "give numbers"),
-    ],
-)
-def test_what_cannot_be_sampled_is_one_line(words, answer, capsys):
-    assert main(["detectability", *words.split()]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert answer in line
-
-
 def test_too_many_samples_are_refused():
     base = gensig.fault_pairs(*SMALL, n_units=4)
     with pytest.raises(ConfigError, match="51 sizes x 2 ratios are more than 100"):

@@ -222,36 +222,6 @@ def test_helical_stages_have_shorter_steps(gensig, tmp_path, words, steps):
     assert experiment["plan"]["fault_gear"] == "drawn"
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("--teeth 29 100 36", "--teeth takes 2, 4 or 6 numbers, .* not 3"),
-        ("--teeth 29 100 0 90", "--teeth 0 must be positive"),
-        ("--teeth 29 100 36 9", "stage 2, 36/9: wheel: 9 teeth .* undercut"),
-        ("--teeth 29 100", "--module takes one number for a pair of gears, not 2"),
-        ("--module 1 2 3", "--module takes one number for all stages, or 2"),
-        ("--module -2", "--module -2 must be positive"),
-        ("--widths 9 8 7", "--widths takes one number for all stages, or 2"),
-        ("--profile-shifts 0 1", "--profile-shifts takes one .* or 4: one a gear"),
-        ("--bores 20", "--bores is for one pair of gears; edit bore_radius_mm"),
-        ("--supports 1e8", "--supports is for one pair of gears; edit system.support"),
-        ("--sensors housing", "--sensors is for one pair of gears; records of a"),
-        ("--experiment realistic", "records of a drive line have no housing"),
-        ("--rate 1000", "--rate 1000: the mesh frequency reaches 870 Hz"),
-        ("--speed 0", "--speed 0 must be positive"),
-    ],
-)
-def test_a_mistake_is_one_line_and_writes_nothing(
-    words, message, tmp_path, capsys, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    assert main(f"{NEW} {words}".split()) == 2
-    said = capsys.readouterr().err.strip()
-    assert re.search(message, said)
-    assert "\n" not in said
-    assert not list(tmp_path.rglob("*.*"))
-
-
 def test_shipped_and_taken_names_are_refused(gensig, tmp_path, capsys):
     assert main(NEW.replace("mine", "two_stage_gearbox").split()) == 2
     assert "system=two_stage_gearbox comes with gensig" in capsys.readouterr().err

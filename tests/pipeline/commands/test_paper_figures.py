@@ -131,19 +131,6 @@ def test_a_missing_tooth_is_an_impact_a_turn_by_the_papers_equations(written):
     assert 1e3 < highest["gensig's default"] < 5e3
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["nope"], "no such paper; take one of spur, helical_heat"),
-        (["wear", "12"], "simulation draws figures 5, 6, 7, 8, 9, 10 of this paper"),
-    ],
-)
-def test_what_is_not_there_is_named(tmp_path, capsys, words, told):
-    assert main(["figures", *words, "--dir", str(tmp_path / "new")]) == 2
-    assert told in capsys.readouterr().err
-    assert not (tmp_path / "new").exists()
-
-
 def test_a_file_is_no_folder(tmp_path, capsys):
     file = tmp_path / "figures"
     file.write_text("mine")

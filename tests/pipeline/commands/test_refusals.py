@@ -18,6 +18,10 @@ PUMP = f"{TUNE} {ENGINE} --mesh 21 45"
 DAMPERS = f"gensig modes {TRAIN} system.dampers="
 SHEET = "--teeth 20 45 --module 3 --speed 1500 --torque 60"
 NEW = f"gensig new gearbox mine {SHEET}"
+STAGES = "gensig new gearbox mine --teeth 29 100 36 90 --module 1.5 2 --speed 1500 --torque 10"
+RAMP = "operating=ramp operating.duration_s=0.2"
+ORDERS = "gensig simulate --orders r.csv operating.duration_s"
+FIGURES = "gensig figures --dir figures"
 WORN = (
     "gensig wear-life operating.duration_s=0.1 sensing.channels=[pinion_y,wheel_y] "
     "wear.threshold_um=40"
@@ -243,6 +247,15 @@ REFUSED = {
     f"{DETECT} --workers 0": "--workers 0 must be at least 1",
     f"{DETECT} --plot map.txt": "--plot map.txt: the name must end in .png",
     f"{DETECT} plan.n_gearboxes=0": "plan.n_gearboxes = 0",
+    f"{DETECT} --torques 20 20": "torques in N m: 20, 20; give positive numbers",
+    "diagnose detectability fault=missing_tooth --snrs 10": (
+        "fault=missing_tooth has no single size"
+    ),
+    f"{DETECT} --sizes 1 1": "--sizes: 1, 1; give numbers, each once",
+    f"{DETECT} --sizes 0 1": "crack_depth_mm = 0",
+    f"{DETECT} --snrs 10 --speeds 900": "give operating.speed_rpm=RPM",
+    f"{DETECT} --sizes 1 fault.crack_depth_mm=2": "given twice",
+    f"{DETECT} --sizes deep": "give numbers",
     # drive lines
     (
         f"gensig forced-response {TRAIN} ~excitation operating.speed_rpm=1688 "
@@ -314,6 +327,33 @@ REFUSED = {
     f"{NEW} --grade 20": "quality.iso1328_grade = 20 must lie in",
     f"{NEW} --widths 1 2 3": "--widths takes one number for both gears, or two",
     f"{NEW} --helix 60": "helix_angle_deg",
+    f"{STAGES} --teeth 29 100 36": "of each stage, not 3",
+    f"{STAGES} --teeth 29 100 0 90": "--teeth 0 must be positive",
+    f"{STAGES} --teeth 29 100 36 9": "stage 2, 36/9: wheel: 9 teeth",
+    f"{STAGES} --teeth 29 100": "--module takes one number for a pair of gears, not 2",
+    f"{STAGES} --module 1 2 3": "--module takes one number for all stages, or 2",
+    f"{STAGES} --module -2": "--module -2 must be positive",
+    f"{STAGES} --widths 9 8 7": "--widths takes one number for all stages, or 2",
+    f"{STAGES} --profile-shifts 0 1": "one number for all gears, or 4: one a gear",
+    f"{STAGES} --bores 20": "--bores is for one pair of gears; edit bore_radius_mm",
+    f"{STAGES} --supports 1e8": "is for one pair of gears; edit system.support",
+    f"{STAGES} --sensors housing": "--sensors is for one pair of gears; records of a",
+    f"{STAGES} --experiment realistic": "records of a drive line have no housing",
+    f"{STAGES} --rate 1000": "--rate 1000: the mesh frequency reaches 870 Hz",
+    f"{STAGES} --speed 0": "--speed 0 must be positive",
+    # run-ups
+    f"gensig simulate --orders r.csv {RAMP}": "orders over speed need 8",
+    f"{ORDERS}=0.2": "changes by 5 % or less",
+    f"{ORDERS}=1 operating.speed_profile=[[0,0.1],[0.3,1]]": (
+        "orders over speed need 10 % or less"
+    ),
+    f"{ORDERS}=1 operating.speed_profile=[[0,1e-6],[1,1]]": "stands still or turns back",
+    "gensig run-up operating.duration_s=0.2": "changes by 5 % or less",
+    f"gensig run-up {RAMP}": "orders over speed need 8",
+    f"gensig run-up {RAMP} sensing.channels=[pinion_rotation]": "accelerations in m/s2",
+    # figures of papers
+    f"{FIGURES} nope": "no such paper; take one of spur, helical_heat",
+    f"{FIGURES} wear 12": "simulation draws figures 5, 6, 7, 8, 9, 10 of this paper",
 }
 
 
@@ -325,7 +365,7 @@ def test_a_mistake_is_one_line(typed, tmp_path, monkeypatch, capsys):
     (line,) = [
         line
         for line in capsys.readouterr().err.splitlines()
-        if not line.startswith(("gensig: note:", "searching for"))
+        if not line.startswith(("gensig: note:", "searching for", "run-up of"))
     ]
     assert line.startswith(f"{command}: ")
     assert REFUSED[typed] in line

@@ -22,6 +22,7 @@ from diagnose.cli import main
 from diagnose.data.window_input import Windows
 from diagnose.data.windows import load_windows, subset_segments
 from diagnose.report.control_sections import controls_section, oracle_verdict, verdict
+from diagnose.scoring.intervals import side_of
 from diagnose.scoring.metrics import ratio_with_interval
 from diagnose.scoring.predictions import Prediction, Rows
 from diagnose.studies.baseline_runs import baseline_predictions
@@ -352,13 +353,19 @@ def test_the_section_is_empty_without_controls():
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "says"),
-    [(0.2, 0.3, "at chance"), (0.3, 0.4, "ABOVE chance"), (0.1, 0.2, "below chance")],
+    ("low", "high", "side", "says"),
+    [
+        (0.2, 0.3, "neither", "at chance"),
+        (0.25, 0.3, "neither", "at chance"),
+        (0.3, 0.4, "above", "ABOVE chance"),
+        (0.1, 0.2, "below", "below chance"),
+        (None, None, None, "no verdict: too few machines"),
+    ],
 )
-def test_verdicts(low, high, says):
-    assert verdict({"balanced_accuracy": {"low": low, "high": high}}, 0.25).startswith(
-        says
-    )
+def test_verdicts(low, high, side, says):
+    score = {"low": low, "high": high}
+    assert side_of(score, 0.25) == side
+    assert verdict({"balanced_accuracy": score}, 0.25).startswith(says)
 
 
 # ---- mistakes

@@ -2,12 +2,12 @@
 pressures.
 """
 
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from refusals import given, refused
 
 from gensig.driveline.excitation.cycle import (
     CYCLE,
@@ -23,7 +23,6 @@ from gensig.driveline.excitation.pressure import (
     read_pressure,
     wiebe_parts,
 )
-from gensig.errors import ConfigError
 
 CYLINDER = Cylinder(
     bore=0.17,
@@ -148,23 +147,17 @@ def test_a_delay_of_whole_points_moves_and_changes_nothing():
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [
-        ({"bore": 0.0}, "bore_mm = 0 must be positive"),
-        ({"stroke": -0.1}, "stroke_mm = -100 must be positive"),
-        (
-            {"crank_to_rod_ratio": 1.0},
-            "crank_to_rod_ratio = 1 must lie between 0 and 1",
-        ),
-        ({"compression_ratio": 1.0}, "compression_ratio = 1 must be above 1"),
-        (
-            {"reciprocating_mass": -1.0},
-            "reciprocating_mass_kg = -1 must not be negative",
-        ),
-    ],
+    {
+        "bore=0.0": "bore_mm = 0 must be positive",
+        "stroke=-0.1": "stroke_mm = -100 must be positive",
+        "crank_to_rod_ratio=1.0": "crank_to_rod_ratio = 1 must lie between 0 and 1",
+        "compression_ratio=1.0": "compression_ratio = 1 must be above 1",
+        "reciprocating_mass=-1.0": "reciprocating_mass_kg = -1 must not be negative",
+    }.items(),
 )
 def test_cylinders_that_cannot_be_are_refused(change, message):
-    with pytest.raises(ConfigError, match=re.escape(message)):
-        replace(CYLINDER, **change)
+    with refused(message):
+        replace(CYLINDER, **given(change))
 
 
 @pytest.mark.parametrize(
@@ -187,7 +180,7 @@ def test_cylinders_that_cannot_be_are_refused(change, message):
     ],
 )
 def test_cycles_that_cannot_be_are_refused(change, message):
-    with pytest.raises(ConfigError, match=re.escape(message)):
+    with refused(message):
         replace(CYCLE_OPTION, **change)
 
 
@@ -275,7 +268,6 @@ def test_a_measured_pressure_is_read_whatever_its_units_and_start(
 def test_measured_pressures_that_make_no_cycle_are_refused(
     tmp_path, header, angle, pressure, message
 ):
-    with pytest.raises(ConfigError, match=re.escape(message)) as caught:
+    with refused(message) as caught:
         read_pressure(write(tmp_path, header, angle, pressure), N)
     assert str(caught.value).startswith("excitation.pressure.file = ")
-    assert "\n" not in str(caught.value)

@@ -1,16 +1,15 @@
 """Firing of cylinders: even firing of the 20-cylinder engine, and layouts that cannot be."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from engine_cases import IN_SEQUENCE, option, with_throws
 from numpy.testing import assert_allclose
+from refusals import refused
 
 from gensig.driveline.excitation.engine import read_engine
 from gensig.driveline.excitation.firing import Layout
-from gensig.errors import ConfigError
 
 V20 = read_engine(option()).layout
 
@@ -85,9 +84,8 @@ def test_five_pairs_of_throws_72_degrees_apart_fire_two_at_a_time():
     for turn in range(2):
         for place in range(5):
             order += [f"A{place + 1 + 5 * turn}", f"B{(place - 1) % 5 + 1 + 5 * turn}"]
-    with pytest.raises(
-        ConfigError,
-        match=r"A1 and B5 fire together with these bank_angles_deg and throw_angles_deg",
+    with refused(
+        "A1 and B5 fire together with these bank_angles_deg and throw_angles_deg"
     ):
         replace(V20, throw_angles=throws, firing_order=tuple(order))
 
@@ -127,9 +125,8 @@ def test_five_pairs_of_throws_72_degrees_apart_fire_two_at_a_time():
     ],
 )
 def test_layouts_that_cannot_be_are_refused(change, message):
-    with pytest.raises(ConfigError, match=re.escape(message)) as caught:
+    with refused(message):
         replace(V20, **change)
-    assert "\n" not in str(caught.value)
 
 
 def test_two_throws_are_one_within_a_hundredth_of_a_degree():
@@ -142,5 +139,5 @@ def test_two_throws_are_one_within_a_hundredth_of_a_degree():
         )
 
     assert_allclose(gaps(twin(0.005)), 360.0, atol=0.01)
-    with pytest.raises(ConfigError, match="takes 360 degrees"):
+    with refused("takes 360 degrees"):
         twin(0.1)

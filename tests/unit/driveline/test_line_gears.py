@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from closeness import assert_close
 
+from gensig import load_system
 from gensig.driveline.drive_line import read_drive_line
 from gensig.driveline.line_gears import gear_names, line_bodies, pinion_turns, slug
 from gensig.driveline.machine_checks import FAR_ABOVE, warn_of_supports
 from gensig.plan.request import read_request
-from gensig.record.machines import read_machine
 from gensig.systems.base import further_gears, home_meshes
 
 
@@ -76,7 +76,7 @@ def test_bodies_are_in_the_order_of_the_gears(drive):
 
 def test_a_gear_is_at_home_in_the_followed_mesh_or_in_its_first_one():
     words = ["experiment=engine_test_point", "system.record_mesh=[20,43]"]
-    machine = read_machine(read_request(words).config)
+    machine = load_system(*words)
     names = machine.engine.mesh_names
     homes = {
         gear: names[number] for gear, number in home_meshes(machine.meshes).items()

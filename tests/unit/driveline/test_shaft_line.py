@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from refusals import refused
 
 from gensig.driveline.linear.matrices import line_matrices
 from gensig.driveline.linear.shaft_line import (
@@ -97,9 +98,7 @@ def test_a_loop_that_turns_is_counted_and_one_that_locks_is_refused():
     locks = r"row 7: this joint closes a loop that locks.* out at -0\.491803.*at -0\.5"
     with pytest.raises(ConfigError, match=locks):
         ShaftLine(nodes=nodes, gears=(*gears[:3], gear("d", 1, 61)), meshes=meshes)
-    with pytest.raises(
-        ConfigError, match="loop that locks"
-    ):  # three gears in a ring turn no way
+    with refused("loop that locks"):  # three gears in a ring turn no way
         ShaftLine(
             nodes=(*nodes, Node(name="third", inertia=1.0)),
             gears=tuple(gear(str(place), place, 20) for place in range(3)),
@@ -193,7 +192,7 @@ def test_lateral_motion_is_in_frames_along_the_first_mesh_of_a_gear():
         ({"nodes": ()}, "at least one node"),
         (
             {"shafts": (Shaft(first=0, second=9, stiffness=1.0),)},
-            r"there is no node 9, only 0\.\.4",
+            "there is no node 9, only 0..4",
         ),
         (
             {"meshes": (GearMesh(driving=0, driven=3, stiffness=1.0),)},
@@ -209,7 +208,7 @@ def test_lateral_motion_is_in_frames_along_the_first_mesh_of_a_gear():
 )
 def test_what_joins_nothing_is_refused(changes, message):
     changes.setdefault("shafts", ())
-    with pytest.raises(ConfigError, match=message):
+    with refused(message):
         branched(**changes)
 
 
@@ -249,27 +248,23 @@ def test_what_joins_nothing_is_refused(changes, message):
         ),
         (
             lambda: replace(gear("a", 0, 20), n_teeth=0),
-            r"a: teeth \(0\) and base radius",
+            "a: teeth (0) and base radius",
         ),
         (lambda: replace(gear("a", 0, 20), mass=0.0), "a: mass 0 kg"),
     ],
 )
 def test_what_cannot_be_is_refused(make, message):
-    with pytest.raises(ConfigError, match=message):
+    with refused(message):
         make()
 
 
 def test_lateral_motion_needs_mass_and_support():
     loose = (replace(gear("p", 1, 20), support=None), *branched().gears[1:])
-    with pytest.raises(
-        ConfigError, match="p: its lateral motion needs a mass and a support"
-    ):
+    with refused("p: its lateral motion needs a mass and a support"):
         line_matrices(branched(gears=loose), lateral=True)
     soft = (
         replace(gear("p", 1, 20), support=replace(SUPPORT, stiffness_x=0.0)),
         *branched().gears[1:],
     )
-    with pytest.raises(
-        ConfigError, match="p: its support needs stiffness along both axes"
-    ):
+    with refused("p: its support needs stiffness along both axes"):
         line_matrices(branched(gears=soft), lateral=True)

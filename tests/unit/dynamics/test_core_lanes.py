@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from core_runs import MISSING, PAPER, CoreRun
 
+from gensig import load_system
 from gensig.dynamics.backends.nystroem.machine_lanes import is_followed_by_three
 from gensig.dynamics.backends.nystroem.method import ANY_LAW, THREE_PAIRS
 from gensig.faults.broken import MissingTooth
-from gensig.plan.request import read_request
 from gensig.systems.pair_machine import running_pair
-from gensig.systems.registry import read_system
 from gensig.systems.run import Run
 
 N_STEPS = 1500
@@ -28,7 +27,7 @@ KINDS = {
 def helical(speed, torque, faults):
     """A helical pair of tens of micrometres, so that its chords change."""
     words = [f"{SPEED}={speed}", f"{TORQUE}={5 * torque}", "mesh.n_slices=10"]
-    system = read_system(read_request(["experiment=helical", *words]).config)
+    system = load_system("experiment=helical", *words)
     return running_pair(Run(system=system, faults=faults)).dynamics
 
 

@@ -166,127 +166,97 @@ WITH_LIMIT = (
     "misalignment",
     "tip_relief",
 )
-# (what is typed, words of the message); keys that are not typed are those of the kind's option
-REFUSED = [
-    ("crack crack_depht_mm=1", "unknown key 'crack_depht_mm'; did you mean 'crack_d"),
-    ("crack crack_depth_mm=null", "fault.crack_depth_mm is null; give a value"),
-    ("crack tooth=-1", "fault.tooth = -1 must be at least 0"),
-    ("crack tooth=[4,-2]", "fault.tooth = -2 must be at least 0"),
-    ("crack tooth=[1,5,1]", "= [1, 5, 1] must name one tooth or more, each once"),
-    ("crack tooth=[]", "fault.tooth = [] must name one tooth or more"),
-    ("crack tooth=[0,23]", "fault.tooth = 23 is not on the pinion, whose teeth are 0"),
-    (
-        "crack tooth=every",
-        "fault.tooth = 'every'; give a number, a list of numbers, or",
+# what is typed: words of the message; keys that are not typed are those of the kind's option
+REFUSED = {
+    "crack crack_depht_mm=1": "unknown key 'crack_depht_mm'; did you mean 'crack_d",
+    "crack crack_depth_mm=null": "fault.crack_depth_mm is null; give a value",
+    "crack tooth=-1": "fault.tooth = -1 must be at least 0",
+    "crack tooth=[4,-2]": "fault.tooth = -2 must be at least 0",
+    "crack tooth=[1,5,1]": "= [1, 5, 1] must name one tooth or more, each once",
+    "crack tooth=[]": "fault.tooth = [] must name one tooth or more",
+    "crack tooth=[0,23]": "fault.tooth = 23 is not on the pinion, whose teeth are 0",
+    "crack tooth=every": "fault.tooth = 'every'; give a number, a list of numbers, or",
+    "crack tooth='3'": "fault.tooth = '3'; give a number, a list of numbers, or all",
+    "crack crack_depth_mm=4.2": "through the root chord 3.984 mm of the pinion",
+    "crack crack_depth_mm=5 gear=wheel": "crack_depth 5 mm reaches through the root chord 4.8",
+    "crack crack_angle_deg=0": "fault.crack_angle_deg = 0 must lie in 0..90",
+    "crack crack_angle_deg=91": "fault.crack_angle_deg = 91 must lie in 0..90",
+    "crack crack_start=tip": "crack_start = 'tip'; allowed: arc_mid, gamma_mid",
+    "crack crack_front=round": "= 'round'; allowed: straight, parabolic, linear",
+    "crack crack_side=both": "crack_side = 'both'; allowed: tension, compression",
+    "crack crack_faces=shut": "crack_faces = 'shut'; allowed: open, breathing",
+    "crack crack_width_mm=20.5": "= 20.5 must lie in 0..20, the face width of the pi",
+    "crack crack_width_mm=-1": "fault.crack_width_mm = -1 must lie in 0..20",
+    "pitting pit_width_mm=21": (
+        "pit from -0.5 to 20.5 mm across the face leaves the pinion tooth, which is 20 mm"
     ),
-    ("crack tooth='3'", "fault.tooth = '3'; give a number, a list of numbers, or all"),
-    ("crack crack_depth_mm=4.2", "through the root chord 3.984 mm of the pinion"),
-    (
-        "crack crack_depth_mm=5 gear=wheel",
-        "crack_depth 5 mm reaches through the root chord 4.8",
+    "pitting pit_face_position_mm=4": "the pit from -1 to 9 mm across the face leaves",
+    "pitting pit_face_position_mm=16": "pit from 11 to 21 mm across the face leaves",
+    "pitting pit_length_mm=9": "leaves the flank of the pinion tooth, which reaches f",
+    "pitting pit_position_mm=0.1": "the pit from -0.4 to 0.6 mm above the root chord",
+    "pitting pit_position_mm=9": "the pit from 8.5 to 9.5 mm above the root chord",
+    "pitting pit_depth_mm=3": (
+        "pit_depth 3 mm reaches the centreline of the pinion tooth (half thickness 1.4"
     ),
-    ("crack crack_angle_deg=0", "fault.crack_angle_deg = 0 must lie in 0..90"),
-    ("crack crack_angle_deg=91", "fault.crack_angle_deg = 91 must lie in 0..90"),
-    ("crack crack_start=tip", "crack_start = 'tip'; allowed: arc_mid, gamma_mid"),
-    ("crack crack_front=round", "= 'round'; allowed: straight, parabolic, linear"),
-    ("crack crack_side=both", "crack_side = 'both'; allowed: tension, compression"),
-    ("crack crack_faces=shut", "crack_faces = 'shut'; allowed: open, breathing"),
-    ("crack crack_width_mm=20.5", "= 20.5 must lie in 0..20, the face width of the pi"),
-    ("crack crack_width_mm=-1", "fault.crack_width_mm = -1 must lie in 0..20"),
-    (
-        "pitting pit_width_mm=21",
-        "pit from -0.5 to 20.5 mm across the face leaves the pinion tooth, which is 20 mm",
+    "spalling spall_width_mm=20.2": "the spall from -0.1 to 20.1 mm across the face",
+    "spalling spall_length_mm=9": "above the root chord leaves the flank of the pinio",
+    "spalling spall_depth_mm=3": "spall_depth 3 mm reaches the centreline",
+    "spalling spall_shape=round": "= 'round'; allowed: rectangular, elliptic",
+    "distributed_pitting pitted_share=0.4": (
+        "fault.pitted_share = 0.4 must lie in 0..0.35, 0.7 of the region"
     ),
-    (
-        "pitting pit_face_position_mm=4",
-        "the pit from -1 to 9 mm across the face leaves",
+    "distributed_pitting pitted_share=-0.1": "= -0.1 must lie in 0..0.35",
+    "distributed_pitting region_low=0.6": "= 0.6 must lie below region_high",
+    "distributed_pitting region_high=1.1": "= 1.1 must not be above 1, the tip",
+    "distributed_pitting pit_diameter_mm=0": "pit_diameter_mm = 0 must be positive",
+    "distributed_pitting depth_ratio=0.6": "depth_ratio = 0.6 must lie in 0..0.5",
+    "distributed_pitting diameter_scatter=1.1": "= 1.1 must lie in 0..1",
+    "distributed_pitting pit_diameter_mm=0.001": (
+        "pits of 0.001 mm do not make fault.pitted_share = 0.1"
     ),
-    ("pitting pit_face_position_mm=16", "pit from 11 to 21 mm across the face leaves"),
-    (
-        "pitting pit_length_mm=9",
-        "leaves the flank of the pinion tooth, which reaches f",
+    "pitting pit_edge_height_um=20": (
+        "fault.pit_edge_width_mm = 0 is too narrow for a raised edge: the pinion tooth is drawn"
     ),
-    ("pitting pit_position_mm=0.1", "the pit from -0.4 to 0.6 mm above the root chord"),
-    ("pitting pit_position_mm=9", "the pit from 8.5 to 9.5 mm above the root chord"),
-    (
-        "pitting pit_depth_mm=3",
-        "pit_depth 3 mm reaches the centreline of the pinion tooth (half thickness 1.4",
+    "spalling spall_edge_height_um=9": "fault.spall_edge_width_mm = 0 is too narrow",
+    "distributed_pitting pit_edge_height_um=9": "pit_edge_width_mm = 0 is too narrow",
+    "chipped chip_edge_height_um=9": "fault.chip_edge_width_mm = 0 is too narrow",
+    "broken broken_edge_height_um=9": "or set fault.broken_edge_height_um=0",
+    "surface_damage edge_width_mm=0.01 tooth=1": "fault.edge_width_mm = 0.01 is too narrow",
+    "surface_damage damage=1.1": "fault.damage = 1.1 must lie in 0..1",
+    "surface_damage spalled_share=-0.1": "spalled_share = -0.1 must lie in 0..1",
+    "surface_damage spall_length_share=2": "_length_share = 2 must lie in 0..1",
+    "surface_damage dented_share=0.8": "0.8 must be at most 0.67: other teeth are sp",
+    "surface_damage roughness_length_mm=0": "_length_mm = 0 must be positive",
+    "surface_damage dent_diameter_mm=0": "dent_diameter_mm = 0 must be positive",
+    "surface_damage dent_depth_um=200": "200 must be at most 150, half of the smallest",
+    "surface_damage dent_diameter_mm=4 spalled_share=0 dented_share=1": (
+        "fault.dent_diameter_mm = 4 makes dents up to 6 mm, above the flank's height"
     ),
-    ("spalling spall_width_mm=20.2", "the spall from -0.1 to 20.1 mm across the face"),
-    (
-        "spalling spall_length_mm=9",
-        "above the root chord leaves the flank of the pinio",
-    ),
-    ("spalling spall_depth_mm=3", "spall_depth 3 mm reaches the centreline"),
-    ("spalling spall_shape=round", "= 'round'; allowed: rectangular, elliptic"),
-    (
-        "distributed_pitting pitted_share=0.4",
-        "fault.pitted_share = 0.4 must lie in 0..0.35, 0.7 of the region",
-    ),
-    ("distributed_pitting pitted_share=-0.1", "= -0.1 must lie in 0..0.35"),
-    ("distributed_pitting region_low=0.6", "= 0.6 must lie below region_high"),
-    ("distributed_pitting region_high=1.1", "= 1.1 must not be above 1, the tip"),
-    ("distributed_pitting pit_diameter_mm=0", "pit_diameter_mm = 0 must be positive"),
-    ("distributed_pitting depth_ratio=0.6", "depth_ratio = 0.6 must lie in 0..0.5"),
-    ("distributed_pitting diameter_scatter=1.1", "= 1.1 must lie in 0..1"),
-    (
-        "distributed_pitting pit_diameter_mm=0.001",
-        "pits of 0.001 mm do not make fault.pitted_share = 0.1",
-    ),
-    (
-        "pitting pit_edge_height_um=20",
-        "fault.pit_edge_width_mm = 0 is too narrow for a raised edge: the pinion tooth is drawn",
-    ),
-    ("spalling spall_edge_height_um=9", "fault.spall_edge_width_mm = 0 is too narrow"),
-    (
-        "distributed_pitting pit_edge_height_um=9",
-        "pit_edge_width_mm = 0 is too narrow",
-    ),
-    ("chipped chip_edge_height_um=9", "fault.chip_edge_width_mm = 0 is too narrow"),
-    ("broken broken_edge_height_um=9", "or set fault.broken_edge_height_um=0"),
-    (
-        "surface_damage edge_width_mm=0.01 tooth=1",
-        "fault.edge_width_mm = 0.01 is too narrow",
-    ),
-    ("surface_damage damage=1.1", "fault.damage = 1.1 must lie in 0..1"),
-    ("surface_damage spalled_share=-0.1", "spalled_share = -0.1 must lie in 0..1"),
-    ("surface_damage spall_length_share=2", "_length_share = 2 must lie in 0..1"),
-    ("surface_damage dented_share=0.8", "0.8 must be at most 0.67: other teeth are sp"),
-    ("surface_damage roughness_length_mm=0", "_length_mm = 0 must be positive"),
-    ("surface_damage dent_diameter_mm=0", "dent_diameter_mm = 0 must be positive"),
-    (
-        "surface_damage dent_depth_um=200",
-        "200 must be at most 150, half of the smallest",
-    ),
-    (
-        "surface_damage dent_diameter_mm=4 spalled_share=0 dented_share=1",
-        "fault.dent_diameter_mm = 4 makes dents up to 6 mm, above the flank's height",
-    ),
-    ("surface_damage spall_depth_mm=3 tooth=1", "spall_depth 3 mm reaches the centrel"),
-    ("broken broken_height_mm=5", "5 mm is above the height 4.676 mm of the pinion"),
-    ("chipped chip_height_mm=5", "5 mm is above the height 4.676 mm of the pinion t"),
-    ("chipped chip_width_mm=21", "chip_width 21 mm is above the face width 20 mm of"),
-    ("chipped chip_shape=round", "= 'round'; allowed: triangular, rectangular"),
-    ("wear wear_profile=[1.0]", "(1.0,) must hold two depths or more, none negative"),
-    ("wear wear_profile=[]", "fault.wear_profile = () must hold two depths or more"),
-    ("wear wear_profile=[1.0,-0.1]", "= (1.0, -0.1) must hold two depths or more, no"),
-    ("runout tooth=all", "= 'all' must be the one tooth that stands back most"),
-    ("runout tooth=[1,2]", "= (1, 2) must be the one tooth that stands back most"),
-    ("tip_relief relief_length_mm=11", "11 must not be above 10.55 mm, the involute"),
-    ("tip_relief relief_curve=round", "= 'round'; allowed: linear, parabolic"),
-]
+    "surface_damage spall_depth_mm=3 tooth=1": "spall_depth 3 mm reaches the centrel",
+    "broken broken_height_mm=5": "5 mm is above the height 4.676 mm of the pinion",
+    "chipped chip_height_mm=5": "5 mm is above the height 4.676 mm of the pinion t",
+    "chipped chip_width_mm=21": "chip_width 21 mm is above the face width 20 mm of",
+    "chipped chip_shape=round": "= 'round'; allowed: triangular, rectangular",
+    "wear wear_profile=[1.0]": "(1.0,) must hold two depths or more, none negative",
+    "wear wear_profile=[]": "fault.wear_profile = () must hold two depths or more",
+    "wear wear_profile=[1.0,-0.1]": "= (1.0, -0.1) must hold two depths or more, no",
+    "runout tooth=all": "= 'all' must be the one tooth that stands back most",
+    "runout tooth=[1,2]": "= (1, 2) must be the one tooth that stands back most",
+    "tip_relief relief_length_mm=11": "11 must not be above 10.55 mm, the involute",
+    "tip_relief relief_curve=round": "= 'round'; allowed: linear, parabolic",
+}
 for kind in KINDS:
-    REFUSED.append((f"{kind} gear=ring", "gear = 'ring'; allowed: pinion, wheel"))
+    REFUSED[f"{kind} gear=ring"] = "gear = 'ring'; allowed: pinion, wheel"
     for gear, n in (("pinion", 23), ("wheel", 84)):
         words = f"{kind} gear={gear} tooth={n}"
-        REFUSED.append((words, f"fault.tooth = {n} is not on the {gear}, whose teeth"))
+        REFUSED[words] = f"fault.tooth = {n} is not on the {gear}, whose teeth"
     for key in NOT_NEGATIVE.get(kind, ()):
-        REFUSED.append((f"{kind} {key}=-1", f"fault.{key} = -1 must not be negative"))
+        REFUSED[f"{kind} {key}=-1"] = f"fault.{key} = -1 must not be negative"
 for kind in WITH_LIMIT:
-    REFUSED.append((f"{kind} limit_um=0", "fault.limit_um = 0 must be positive"))
+    REFUSED[f"{kind} limit_um=0"] = "fault.limit_um = 0 must be positive"
 
 
-@pytest.mark.parametrize(("words", "text"), REFUSED)
+@pytest.mark.parametrize(("words", "text"), REFUSED.items())
 def test_refusals(xiamen, monkeypatch, words, text):
     monkeypatch.setattr("gensig.faults.pitting.MOST_PITS", 200)
     if "do not make" in text:
@@ -297,7 +267,7 @@ def test_refusals(xiamen, monkeypatch, words, text):
 
 @pytest.mark.parametrize("gear", [3, "", None])
 def test_a_gear_has_a_name(gear):
-    with pytest.raises(FaultError, match="must be the name of a gear"):
+    with refused("must be the name of a gear", FaultError):
         MissingTooth(gear=gear, tooth=0)
 
 

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from gensig.errors import GeometryError
 from gensig.geometry.contact import GearPair
@@ -158,10 +159,10 @@ def test_working_angle_closes_the_backlash():
 def test_hands_that_do_not_match_are_refused():
     pair = beihang()
     for other in (18.0, -17.0, 0.0):
-        with pytest.raises(GeometryError, match=r"equal and of opposite hand"):
+        with refused("equal and of opposite hand", GeometryError):
             dataclasses.replace(
                 pair,
                 wheel=dataclasses.replace(pair.wheel, helix_angle=math.radians(other)),
             )
-    with pytest.raises(GeometryError, match="must lie between -45 and 45"):
+    with refused("must lie between -45 and 45", GeometryError):
         dataclasses.replace(pair.pinion, helix_angle=math.radians(50))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from implant_samples import CARRIER_TEETH, carrier
+from refusals import refused
 from test_implanting import implanter
 
 from gensig.errors import ConfigError, DatasetError
@@ -61,14 +62,14 @@ def test_a_block_that_carried_is_refused_and_one_held_out_is_not(pairs, healthy)
         DatasetError, match=rf"carried implants.*held out.*{held.start}"
     ):
         refuse_carried(stored, recording, start=held.start - 1, stop=held.stop)
-    with pytest.raises(DatasetError, match=r"mine: samples 0 to"):
+    with refused("mine: samples 0 to", DatasetError):
         refuse_carried(stored, held.sha256, name="mine")
     refuse_carried(stored, carrier(9)[0])  # another recording of the machine
     assert read_blocks({"seed": 0}) == ()
 
 
 def test_a_damaged_list_is_refused():
-    with pytest.raises(DatasetError, match=r"list of blocks is damaged"):
+    with refused("list of blocks is damaged", DatasetError):
         read_blocks({"implants": {"blocks": [{"number": 0}]}})
 
 
@@ -87,7 +88,7 @@ def test_too_few(pairs, healthy, choices, words):
 
 @pytest.mark.parametrize("teeth", [(20,), (20, 30, 40), (3, 20), ()])
 def test_teeth_that_are_no_stages(teeth):
-    with pytest.raises(ConfigError, match=r"--teeth"):
+    with refused("--teeth"):
         Gearing(teeth=teeth)
 
 

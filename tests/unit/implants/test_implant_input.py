@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from implant_samples import CARRIER_RATE, carrier, write_pairs
+from refusals import refused
 from test_implanting import implanter
 
 from gensig.errors import ConfigError, DatasetError, TooShortError
@@ -12,31 +13,39 @@ from gensig.implants.options import ImplantOptions
 from gensig.implants.simulated_pairs import SimulatedPairs, class_of
 
 
-def refused(kind, words, pairs, recordings, **choices):
+def implants_refused(kind, words, pairs, recordings, **choices):
     with pytest.raises(kind, match=words) as caught:
         implanter(pairs, recordings, **choices)
     assert "\n" not in str(caught.value)
 
 
 def test_no_mesh_near_the_stated_speed(pairs, healthy):
-    refused(ConfigError, r"h0: no s.* the mesh", pairs, healthy, speed=700.0)
+    implants_refused(ConfigError, r"h0: no s.* the mesh", pairs, healthy, speed=700.0)
 
 
 def test_another_rate_or_channel_among_the_recordings(pairs, healthy):
     faster = replace(healthy[1], sampling_rate=1.5 * CARRIER_RATE)
-    refused(ConfigError, r"h1 has 12288 samples a second", pairs, [healthy[0], faster])
+    implants_refused(
+        ConfigError, r"h1 has 12288 samples a second", pairs, [healthy[0], faster]
+    )
     other = replace(healthy[1], sensors=("lid",))
-    refused(ConfigError, r"h1 has the channels lid", pairs, [healthy[0], other])
+    implants_refused(
+        ConfigError, r"h1 has the channels lid", pairs, [healthy[0], other]
+    )
     slow = replace(healthy[0], sampling_rate=4000.0)
-    refused(ConfigError, r"at least 5000 are needed", pairs, [slow])
+    implants_refused(ConfigError, r"at least 5000 are needed", pairs, [slow])
 
 
 def test_the_same_recording_twice(pairs, healthy):
-    refused(ConfigError, r"give each recording once", pairs, [healthy[0], healthy[0]])
+    implants_refused(
+        ConfigError, r"give each recording once", pairs, [healthy[0], healthy[0]]
+    )
 
 
 def test_a_recording_of_too_few_turns(pairs):
-    refused(TooShortError, r"h0: too short", pairs, [carrier(0, seconds=0.3)[0]])
+    implants_refused(
+        TooShortError, r"h0: too short", pairs, [carrier(0, seconds=0.3)[0]]
+    )
 
 
 def test_as_many_speeds_as_recordings(pairs, healthy):
@@ -44,9 +53,9 @@ def test_as_many_speeds_as_recordings(pairs, healthy):
     from gensig.implants.gearing import Gearing
 
     taken = [healthy_recording(each, f"h{k}") for k, each in enumerate(healthy)]
-    with pytest.raises(ConfigError, match=r"3 speeds for 2 recordings"):
+    with refused("3 speeds for 2 recordings"):
         follow_all(taken, Gearing(teeth=(20, 30)), [900.0] * 3)
-    with pytest.raises(ConfigError, match=r"at least one healthy recording"):
+    with refused("at least one healthy recording"):
         follow_all([], Gearing(teeth=(20, 30)), [900.0])
 
 
@@ -86,17 +95,17 @@ def test_classes_follow_the_number_of_teeth():
 @pytest.mark.parametrize(
     ("choices", "words"),
     [
-        ({"gain_db": (3.0, -3.0)}, r"lower end first"),
-        ({"gain_db": (np.nan, 3.0)}, r"--gain-db"),
-        ({"path": "some"}, r"--path some: allowed are twin, none"),
-        ({"residual": "some"}, r"--residual some: allowed are physics"),
-        ({"n_records": 0}, r"--records 0"),
-        ({"duration": -1.0}, r"--duration"),
-        ({"held_out": 1.0}, r"--held-out 1"),
-        ({"plain_healthy": 1.5}, r"--plain-healthy 1.5"),
-        ({"seed": -1}, r"--seed -1"),
+        ({"gain_db": (3.0, -3.0)}, "lower end first"),
+        ({"gain_db": (np.nan, 3.0)}, "--gain-db"),
+        ({"path": "some"}, "--path some: allowed are twin, none"),
+        ({"residual": "some"}, "--residual some: allowed are physics"),
+        ({"n_records": 0}, "--records 0"),
+        ({"duration": -1.0}, "--duration"),
+        ({"held_out": 1.0}, "--held-out 1"),
+        ({"plain_healthy": 1.5}, "--plain-healthy 1.5"),
+        ({"seed": -1}, "--seed -1"),
     ],
 )
 def test_options(choices, words):
-    with pytest.raises(ConfigError, match=words):
+    with refused(words):
         ImplantOptions(**choices)

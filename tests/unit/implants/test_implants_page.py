@@ -5,6 +5,7 @@ import csv
 import pytest
 from docs_pages import ROOT, blocks, command_lines
 from implant_samples import CARRIER_RATE, carrier
+from refusals import refused
 
 import gensig
 from gensig.cli import main
@@ -37,7 +38,7 @@ def test_commands_and_python(folder):
     for block in blocks(PAGE):
         if block.language == "python":
             exec(block.code, names)
-    with pytest.raises(DatasetError, match=r"monday.csv: samples 0"):
+    with refused("monday.csv: samples 0", DatasetError):
         names["refuse_carried"](names["blocks"], names["recording"], name="monday.csv")
     with gensig.open_dataset("runs/mine") as data:
         assert data.gear_names[2] == "stage_2_pinion"

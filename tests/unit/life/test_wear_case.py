@@ -217,25 +217,22 @@ def test_turns_until_the_same_teeth_meet(full):
     assert hunting_turns(case_of("gear.pinion.n_teeth=42").pair) == 2
 
 
-LIMIT = "wear.transmission_error_limit_um=9"
+REFUSED = {
+    "wear.sharing=none": "wear.sharing = 'none'; allowed: mesh, one_pair",
+    "wear.n_intervals=0": "wear.n_intervals = 0 must lie in 1..1e+06",
+    "wear.pinion.hardness_hbs=0": "pinion.hardness_hbs = 0 must be positive",
+    "wear.wheel=3": "wear.wheel = 3 must be a group of keys",
+    "wear.transmission_error_limit_um=9 wear.geometry=unworn": "needs wear.geometry=worn",
+    "wear.transmission_error_limit_um=9 wear.sharing=one_pair": "wear.sharing=mesh",
+    "wear.transmission_error_limit_um=9 gear=harbin_38_55": "needs wear.sharing=mesh",
+    "operating.torque_nm=0": "operating.torque_nm = 0 must be positive",
+}
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["wear.sharing=none"], "wear.sharing = 'none'; allowed: mesh, one_pair"),
-        (["wear.n_intervals=0"], "wear.n_intervals = 0 must lie in 1..1e+06"),
-        (["wear.pinion.hardness_hbs=0"], "pinion.hardness_hbs = 0 must be positive"),
-        (["wear.wheel=3"], "wear.wheel = 3 must be a group of keys"),
-        ([LIMIT, "wear.geometry=unworn"], "needs wear.geometry=worn"),
-        ([LIMIT, "wear.sharing=one_pair"], "wear.sharing=mesh"),
-        ([LIMIT, "gear=harbin_38_55"], "needs wear.sharing=mesh"),
-        (["operating.torque_nm=0"], "operating.torque_nm = 0 must be positive"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), REFUSED.items())
 def test_bad_input_is_one_line(words, message):
     with refused(message):
-        case_of(*words)
+        case_of(*words.split())
 
 
 def test_values_of_a_gear_override_those_of_both():

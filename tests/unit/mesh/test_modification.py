@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 from closeness import assert_close
+from refusals import refused
 
-from gensig.errors import ConfigError
 from gensig.mesh.modification import (
     FlankModification,
     PairModification,
@@ -148,35 +148,25 @@ def test_any_size_of_either_gear_is_a_modification(side, size):
     assert of_pair(**{side: FlankModification(**{size: 1e-9})}).is_any
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        (
-            ["modification.pinion.tip_relief_um=-1"],
-            "modification.pinion.tip_relief_um = -1 must not be negative",
-        ),
-        (
-            ["modification.wheel.root_relief_um=1"],
-            "modification.wheel.root_relief_height_mm = 0: a relief of 1 um",
-        ),
-        (
-            ["modification.wheel.profile_shape=round"],
-            "modification.wheel.profile_shape = 'round'; allowed: linear",
-        ),
-        (
-            ["+modification.wheel.tip=1"],
-            "modification.wheel: unknown key 'tip'",
-        ),
-        (
-            ["+modification.helix=1"],
-            "modification: unknown key 'helix'",
-        ),
-    ],
-)
-def test_keys_that_make_no_flank_are_refused(changes, message):
-    with pytest.raises(ConfigError) as caught:
-        _ = PairParts(compose("generate", changes)).modification
-    assert message in str(caught.value)
+NO_FLANK = {
+    "modification.pinion.tip_relief_um=-1": (
+        "modification.pinion.tip_relief_um = -1 must not be negative"
+    ),
+    "modification.wheel.root_relief_um=1": (
+        "modification.wheel.root_relief_height_mm = 0: a relief of 1 um"
+    ),
+    "modification.wheel.profile_shape=round": (
+        "modification.wheel.profile_shape = 'round'; allowed: linear"
+    ),
+    "+modification.wheel.tip=1": "modification.wheel: unknown key 'tip'",
+    "+modification.helix=1": "modification: unknown key 'helix'",
+}
+
+
+@pytest.mark.parametrize(("change", "message"), NO_FLANK.items())
+def test_keys_that_make_no_flank_are_refused(change, message):
+    with refused(message):
+        _ = PairParts(compose("generate", [change])).modification
 
 
 def test_reliefs_that_overlap_are_refused(pair):
@@ -186,15 +176,9 @@ def test_reliefs_that_overlap_are_refused(pair):
         root_relief=MICRO,
         root_relief_height=2 * MILLI,
     )
-    with pytest.raises(
-        ConfigError,
-        match=r"tip_relief_height_mm = 2 and root_relief_height_mm = 2 overlap",
-    ):
+    with refused("tip_relief_height_mm = 2 and root_relief_height_mm = 2 overlap"):
         at(pair, of_pair(pinion=tall))
-    with pytest.raises(
-        ConfigError,
-        match="at both ends overlaps on a face of 14 mm",
-    ):
+    with refused("at both ends overlaps on a face of 14 mm"):
         at(
             pair,
             of_pair(

@@ -16,12 +16,10 @@ from gensig.mesh.options import CHOICES
 from gensig.mesh.pair_table import structural_terms
 from gensig.mesh.thermal.paper_growth import (
     READINGS,
+    HotGear,
     PaperGrowth,
     Reading,
-    base_half_angle,
     gear_growth,
-    hot_load_angle,
-    hot_outline,
     no_growth,
     shift_angle,
 )
@@ -142,20 +140,20 @@ def test_points_of_the_profile_by_hand(flanks):
     """Eqs. (10) to (12) and (15) with round numbers: u_b = 0.1 mm, lambda dT = 0.001."""
     gear = flanks.pair.pinion
     growth = replace(grown(gear), base=1e-4)
+    hot = HotGear(gear=gear, growth=growth, reading=READINGS["paper"])
     base, radius, half = gear.base_radius, 0.25, 0.03
     strain = np.array([[1e-3]])
-    at = gear, growth, READINGS["paper"], strain, np.array([radius]), np.array([half])
-    moved, angle = hot_outline(*at)
+    at = strain, np.array([radius]), np.array([half])
+    moved, angle = hot.outline(*at)
     by_hand = radius + 1e-4 + 1e-3 * (radius - base)
     wider = 1e-3 * 2.0 * radius * half / (2.0 * by_hand)
     at_base = 1e-3 * base * gear.half_tooth_angle_base / (base + 1e-4)
     assert_close(moved, by_hand, 1e-14)
     assert_close(angle, half + wider - at_base, 1e-14)
     assert at_base > wider  # by theta'(0) in alpha_2 the tooth is thinner, not thicker
-    twice = hot_outline(gear, growth, READINGS["paper_twice"], *at[3:])[1]
-    assert_close(twice, half + wider, 1e-14)
-    once = hot_outline(gear, growth, READINGS["paper_once"], *at[3:])[1]
-    assert_close(once, half, 1e-14)
+    for name, expected in (("paper_twice", half + wider), ("paper_once", half)):
+        angle = replace(hot, reading=READINGS[name]).outline(*at)[1]
+        assert_close(angle, expected, 1e-14)
 
 
 def test_the_misprinted_base_angle_lacks_the_profile_shift(flanks):
@@ -163,31 +161,31 @@ def test_the_misprinted_base_angle_lacks_the_profile_shift(flanks):
     printed = math.pi / (2.0 * gear.n_teeth)
     alpha = gear.transverse_pressure_angle
     printed += math.tan(alpha) - alpha
-    assert_close(base_half_angle(gear, READINGS["paper_misprints"]), printed, 1e-12)
-    assert_close(base_half_angle(gear, RIGHT) - printed, shift_angle(gear), 1e-12)
+    right = HotGear(gear=gear, growth=grown(gear), reading=RIGHT)
+    misprinted = replace(right, reading=READINGS["paper_misprints"])
+    assert_close(misprinted.base_half_angle, printed, 1e-12)
+    assert_close(right.base_half_angle - printed, shift_angle(gear), 1e-12)
 
 
 @pytest.mark.parametrize("name", READINGS)
 def test_load_angles_turn_with_the_normal_where_the_tooth_enters(flanks, name):
     """Eq. (20), its slope by finite differences of the hot profile."""
     gear, rules = flanks.pair.pinion, READINGS[name]
-    growth, strain = grown(gear, rules), 2e-3
+    hot, strain = HotGear(gear=gear, growth=grown(gear, rules), reading=rules), 2e-3
     start = 0.5 * gear.base_radius * math.tan(gear.transverse_pressure_angle)
     near = start + np.array([-1e-6, 1e-6])
     base = gear.base_radius
 
-    def normal(growth, strain):
-        roll = near / base
-        half = base_half_angle(gear, rules) - (roll - np.arctan(roll))
-        at = np.array([[strain]]), np.hypot(base, near), half
-        radius, angle = (values[0] for values in hot_outline(gear, growth, rules, *at))
+    def normal(hot, strain):
+        at = np.array([[strain]]), np.hypot(base, near), hot.half_angle(near / base)
+        radius, angle = (values[0] for values in hot.outline(*at))
         x, z = radius * np.cos(angle), radius * np.sin(angle)
         return math.atan2(z[0] - z[1], x[1] - x[0])
 
-    at_rest = no_growth(name).pinion
-    turned = normal(growth, strain) - normal(at_rest, 0.0)
+    at_rest = replace(hot, growth=no_growth(name).pinion)
+    turned = normal(hot, strain) - normal(at_rest, 0.0)
     curvature = np.linspace(start, 1.5 * start, 5)
-    found = hot_load_angle(gear, growth, rules, curvature, (start, strain))
+    found = hot.load_angle(curvature, (start, strain))
     assert_close(found - load_angle(gear, curvature), turned, atol=1e-8)
 
 
@@ -217,7 +215,8 @@ def test_misprints_by_hand(flanks):
     gear, name = pair.pinion, "paper_misprints"
     position = np.linspace(0.0, pair.path_of_contact, 300)
     curvature = pair.curvature("pinion", position)
-    base, alpha_2 = gear.base_radius, base_half_angle(gear, READINGS[name])
+    hot = HotGear(gear=gear, growth=no_growth(name).pinion, reading=READINGS[name])
+    base, alpha_2 = gear.base_radius, hot.base_half_angle
     roll = curvature / base
     contact = np.hypot(base, curvature) * np.cos(alpha_2 - roll + np.arctan(roll))
     profile = tooth_profile(gear)

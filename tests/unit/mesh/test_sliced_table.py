@@ -8,9 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 from closeness import assert_close
+from refusals import refused
 
+from gensig import load_faults
 from gensig.errors import FaultError
-from gensig.faults.registry import read_faults
 from gensig.mesh import pair_table
 from gensig.mesh.load_distribution import (
     PERFECT,
@@ -37,7 +38,7 @@ def table_of(*words):
 
 
 def faults_of(*words):
-    return read_faults(read_request(["system=helical_pair", *words]).config["fault"])
+    return load_faults("system=helical_pair", *words)
 
 
 def at_rest(table, roll, force, meeting=PERFECT):
@@ -191,7 +192,7 @@ def test_too_many_different_teeth_are_refused():
     system = table_of()[0]
     (runout,) = faults_of("fault=runout")
     message = "62 different teeth of the pinion and 133 of the wheel make 8246 pairs"
-    with pytest.raises(FaultError, match=message):
+    with refused(message, FaultError):
         system.mesh_table((runout, replace(runout, gear="wheel")))
 
 

@@ -6,7 +6,7 @@ from math import tau
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from refusals import refused
+from refusals import given, refused
 
 from gensig.errors import SimulationError
 from gensig.sensing.encoder import Disc
@@ -135,19 +135,13 @@ def test_a_shaft_that_turns_back_or_too_few_teeth_are_refused(angle, message):
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [
-        ({"n_teeth": 3}, "n_teeth = 3 must lie in 4..1000"),
-        (
-            {"eccentricity_error": 0.1},
-            "eccentricity_error_deg = 5.72958 must lie in 0..5",
-        ),
-        ({"tooth_error": 0.01}, "tooth_error_deg = 0.572958 must lie in 0..0.225"),
-        (
-            {"clock_frequency": 100.0},
-            "clock_frequency_hz = 100 must lie in 10000..1e+12",
-        ),
-    ],
+    {
+        "n_teeth=3": "n_teeth = 3 must lie in 4..1000",
+        "eccentricity_error=0.1": "eccentricity_error_deg = 5.72958 must lie in 0..5",
+        "tooth_error=0.01": "tooth_error_deg = 0.572958 must lie in 0..0.225",
+        "clock_frequency=100.0": "clock_frequency_hz = 100 must lie in 10000..1e+12",
+    }.items(),
 )
 def test_values_out_of_range(change, message):
     with refused(f"toothed_wheel.{message}"):
-        replace(PERFECT, **change)
+        replace(PERFECT, **given(change))

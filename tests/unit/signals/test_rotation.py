@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 from numpy.testing import assert_allclose
+from refusals import refused
 
 from gensig.signals.averaging import resample_to_angle
 from gensig.signals.rotation import (
@@ -64,11 +65,11 @@ def test_a_turn_gets_the_samples_of_the_slowest_by_itself_and_orders_stay_sharp(
         (-np.arange(100.0), "must rise"),
         (np.arange(99.0), "must rise"),
         (np.full(100, np.nan), "must rise"),
-        (np.linspace(0, np.pi, 100), r"0\.5 turns"),
+        (np.linspace(0, np.pi, 100), "0.5 turns"),
     ],
 )
 def test_angles_that_do_not_rise_by_a_turn_are_refused(angle, message):
-    with pytest.raises(ValueError, match=message):
+    with refused(message, ValueError):
         resample_by_angle(np.ones(100), angle, 10)
 
 
@@ -111,9 +112,9 @@ def test_channels_are_searched_together(rotation):
 
 
 def test_a_search_that_reaches_sidebands_or_folds_is_refused():
-    with pytest.raises(ValueError, match="reaches sidebands"):
+    with refused("reaches sidebands", ValueError):
         find_mesh_frequency(TIME, RATE, 84, 5.0)
-    with pytest.raises(ValueError, match="above half"):
+    with refused("above half", ValueError):
         find_mesh_frequency(TIME, RATE, TEETH, 300.0)
 
 
@@ -139,7 +140,7 @@ def test_angle_from_the_mesh_phase():
 
 def test_no_line_no_angle():
     noise = default_rng(5).standard_normal(TIME.size)
-    with pytest.raises(ValueError, match="no steady line stands out at 460 Hz"):
+    with refused("no steady line stands out at 460 Hz", ValueError):
         mesh_phase_angle(noise, RATE, TEETH, TEETH * 20.0)
     mesh_phase_angle(
         noise + mesh(20.0 * TIME, 0.5),

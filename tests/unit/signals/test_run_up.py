@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from refusals import refused
 from scipy.signal import lsim
 
 from gensig.signals.run_up.level_map import decibels, peaks_over_speed
@@ -143,7 +144,7 @@ def test_a_run_up_that_has_no_orders_is_refused_with_its_numbers(angle, words):
 
 
 def test_a_frame_longer_than_the_record_is_refused():
-    with pytest.raises(ValueError, match="shorter than a frame of 30 s"):
+    with refused("shorter than a frame of 30 s", ValueError):
         frequency_map(np.zeros(TIME.size), ANGLE, RATE, frame=30.0)
 
 

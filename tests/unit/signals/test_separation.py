@@ -4,8 +4,8 @@ does."""
 from math import tau
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
+from refusals import refused
 
 from gensig.signals.indicators import rms
 from gensig.signals.separation import separate_gears
@@ -84,9 +84,9 @@ def test_what_lies_above_half_the_samples_is_taken_away_and_does_not_alias():
 
 
 def test_less_than_a_turn_and_odd_samples_are_refused():
-    with pytest.raises(ValueError, match="4 passages of a tooth, less than 5"):
+    with refused("4 passages of a tooth, less than 5", ValueError):
         separate(np.zeros((1, 64 * 4)))
-    with pytest.raises(ValueError, match="even and at least 2, not 31"):
+    with refused("even and at least 2, not 31", ValueError):
         separate_gears(
             np.zeros((1, 6400)),
             RATE,

@@ -104,5 +104,5 @@ def test_the_course_is_the_frequency_over_time():
     assert np.abs(error).max() < 6e-3
     assert np.std(error) < 2e-3
     for wrong in ({"search": 0.05}, {"highest": 500.0}):
-        with pytest.raises(ValueError, match="no course"):
+        with refused("no course", ValueError):
             course(**wrong)

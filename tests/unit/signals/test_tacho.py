@@ -3,8 +3,8 @@
 from math import tau
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
+from refusals import refused
 
 from gensig.signals.averaging import resample_to_angle
 from gensig.signals.tacho import pulse_times, resample_by_pulses, speed_of_pulses
@@ -95,7 +95,7 @@ def test_several_pulses_a_turn_and_several_channels():
 
 def test_too_few_pulses():
     assert pulse_times(np.zeros(100), RATE).shape == (0,)
-    with pytest.raises(ValueError, match="3 pulses at 4 a turn span no whole turn"):
+    with refused("3 pulses at 4 a turn span no whole turn", ValueError):
         resample_by_pulses(
             np.zeros(100),
             RATE,

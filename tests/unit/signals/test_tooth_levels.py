@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 
 from gensig.signals.tooth_levels import changed_teeth, tooth_levels
 
@@ -89,9 +90,9 @@ def test_a_pattern_of_the_machine_goes_away_and_the_tooth_stays():
 
 def test_a_silent_signal_is_finite_and_a_short_one_refused():
     assert np.isfinite(levels(np.zeros(40_000))).all()
-    with pytest.raises(ValueError, match="no whole turn"):
+    with refused("no whole turn", ValueError):
         levels(rattle(seconds=0.15))
-    with pytest.raises(ValueError, match="must lie inside"):
+    with refused("must lie inside", ValueError):
         tooth_levels(
             rattle(),
             RATE,

@@ -10,12 +10,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from gensig.arrays import Array
 from gensig.dynamics.equations import Element
-
-Array = NDArray[np.float64]
 
 
 class ForceLaw(ABC):

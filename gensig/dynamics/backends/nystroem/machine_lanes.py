@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array, Flags
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._layout import COLUMNS, GAP, GAP_SLOPE
 from gensig.dynamics._vector import aligned
@@ -37,8 +38,6 @@ from gensig.dynamics.lanes import (
 from gensig.dynamics.mesh_teeth import MeshTeeth
 from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.errors import SimulationError
-
-Array = NDArray[np.float64]
 
 CELLS_PER_SECOND = 1000.0  # speed and forces are linear in each cell
 # beyond it a pair may carry outside of the path that the three pairs are followed on
@@ -259,7 +258,7 @@ def _bodies(lanes: Sequence[Lane], precision: str) -> Mapping[str, Any]:
     }
 
 
-def _is_entry(matrices: Array) -> NDArray[np.bool_]:
+def _is_entry(matrices: Array) -> Flags:
     """True where symmetric matrices (lane, row, column) hold more than what is rounded."""
     diagonal = np.sqrt(np.abs(np.einsum("lii->li", matrices)))
     least = ROUNDED * diagonal[:, :, None] * diagonal[:, None, :]

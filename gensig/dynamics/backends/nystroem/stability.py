@@ -6,15 +6,14 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gensig.arrays import Array, Complex
 
 LONGEST = 4.0  # |lambda| h beyond which no step is stable
 RATIO_STEPS = 64  # damping ratios from 0 to 1 at which the limit is computed
 
 
-def stable_rate(rates: NDArray[np.complex128]) -> float:
+def stable_rate(rates: Complex) -> float:
     """Least stable number of steps per second of a machine with eigenvalues in 1/s."""
     size = np.abs(rates)
     moving = size > 0.0

@@ -18,6 +18,10 @@ from gensig.dataset.reader import open_dataset
 from gensig.dataset.storage.atomic import sha256_file
 
 
+def croissant(folder):
+    return json.loads((folder / "croissant.json").read_text(encoding="utf-8"))
+
+
 def _front(text):
     first, matter, _rest = text.split("---\n", 2)
     assert first == ""
@@ -64,10 +68,7 @@ def test_hostile_names_stay_text(tmp_path, plan):
     assert _front(text)["license"] == "cc-by-4.0"
     assert _front(text)["pretty_name"] == "a: [b] license: mine <b>"
     assert "<b>" not in text.split("---\n", 2)[2]
-    assert (
-        json.loads((folder / "croissant.json").read_text(encoding="utf-8"))["name"]
-        == "a: [b] license: mine <b>"
-    )
+    assert croissant(folder)["name"] == "a: [b] license: mine <b>"
 
 
 def test_croissant_is_valid_and_gives_the_records(folder, plan):
@@ -96,7 +97,7 @@ def test_a_column_has_its_meaning_and_its_unit_if_it_has_one():
 
 
 def test_the_validator_would_find_a_mistake(folder):
-    content = json.loads((folder / "croissant.json").read_text(encoding="utf-8"))
+    content = croissant(folder)
     content["recordSet"][0]["field"][0]["source"]["fileObject"]["@id"] = "nowhere.csv"
     (folder / "croissant.json").write_text(json.dumps(content), encoding="utf-8")
     with pytest.raises(mlcroissant.ValidationError):
@@ -110,7 +111,7 @@ def test_croissant_is_read_line_by_line(folder):
 
 
 def test_croissant_lists_every_file_with_its_digest(folder):
-    content = json.loads((folder / "croissant.json").read_text(encoding="utf-8"))
+    content = croissant(folder)
     listed = {item["contentUrl"]: item["sha256"] for item in content["distribution"]}
     assert {f"shards/shard-0000{i}.h5" for i in range(4)} | {
         "plan.csv",
@@ -121,7 +122,7 @@ def test_croissant_lists_every_file_with_its_digest(folder):
 
 def test_responsible_ai_fields_state_facts_and_caveats(tmp_path):
     folder = build(tmp_path / "a", make_plan(), failed=12)
-    content = json.loads((folder / "croissant.json").read_text(encoding="utf-8"))
+    content = croissant(folder)
     for field in (
         "dataCollection",
         "dataLimitations",
@@ -145,7 +146,7 @@ def test_responsible_ai_fields_state_facts_and_caveats(tmp_path):
 
 
 def test_it_is_published_on_the_day_it_was_made(folder):
-    content = json.loads((folder / "croissant.json").read_text(encoding="utf-8"))
+    content = croissant(folder)
     with open_dataset(folder) as data:
         made = data.manifest.environment["created"]
     day = datetime.date.fromisoformat(content["datePublished"])

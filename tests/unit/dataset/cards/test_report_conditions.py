@@ -54,6 +54,15 @@ def twins(tmp_path_factory):
     return build(folder, plan, twin=True, **WITH_SIZE)
 
 
+@pytest.fixture(scope="module")
+def single(tmp_path_factory):
+    """Twelve records of one condition, of three classes, whose severities differ."""
+    severity = np.where(np.arange(12) % 3 == 0, 0.0, 0.05 * np.arange(12))
+    columns = {"severity": severity, "condition_id": np.full(12, "c")}
+    plan = whole_conditions(unit_id=np.full(12, "u"), **columns)
+    return build(tmp_path_factory.mktemp("single") / "set", plan)
+
+
 def views_of(folder, per_class=None):
     with open_dataset(folder) as data:
         return signal_views(data, choose(data, per_class), read_rotation(data))
@@ -88,12 +97,9 @@ def test_conditions_are_shown_whole(whole):
             assert labels[numbers].tolist() == ["healthy", "crack", "pitting"]
 
 
-def test_one_condition_is_spread_over_the_severity(tmp_path):
-    """Twelve records of one condition: of each class the least, middle and greatest."""
-    severity = np.where(np.arange(12) % 3 == 0, 0.0, 0.05 * np.arange(12))
-    columns = {"severity": severity, "condition_id": np.full(12, "c")}
-    plan = whole_conditions(unit_id=np.full(12, "u"), **columns)
-    with open_dataset(build(tmp_path / "set", plan)) as data:
+def test_one_condition_is_spread_over_the_severity(single):
+    """Of each class the least, middle and greatest."""
+    with open_dataset(single) as data:
         (condition,) = choose(data, 3).conditions
     cracks = [shown.index for shown in condition.shown if shown.index % 3 == 1]
     assert [cracks[0], cracks[-1]] == [1, 10]
@@ -289,14 +295,11 @@ def test_a_sweep_steps_through_the_severity_over_twins(twins):
 
 
 def test_a_set_without_twins_has_a_slider_where_a_condition_holds_several_sizes(
-    whole, tmp_path
+    whole, single
 ):
     with open_dataset(whole) as data:
         assert find_sweeps(data, read_rotation(data)) == []
-    severity = np.where(np.arange(12) % 3 == 0, 0.0, 0.05 * np.arange(12))
-    columns = {"severity": severity, "condition_id": np.full(12, "c")}
-    plan = whole_conditions(unit_id=np.full(12, "u"), **columns)
-    with open_dataset(build(tmp_path / "set", plan)) as data:
+    with open_dataset(single) as data:
         sweeps = find_sweeps(data, read_rotation(data))
         text = report_text(data, None)[0]
     assert {sweep.name: len(sweep.records) for sweep in sweeps} == {

@@ -10,11 +10,12 @@ from diagnose.bridge.bridge_machine import bridge_machine
 from diagnose.bridge.implanted_windows import (
     Stretch,
     check_stretches,
+    healthy_stretches,
     judged_stretches,
     judged_windows,
 )
 from diagnose.bridge.protocol import FROZEN
-from diagnose.bridge.rules import carrying_stretches, handbook_answers
+from diagnose.bridge.rules import handbook_answers
 from gensig.errors import DatasetError
 from gensig.implants.blocks import Block
 from gensig.implants.carriers import samples_digest
@@ -56,7 +57,7 @@ def test_only_what_was_held_out_of_healthy_recordings_is_judged(
     stretches = judged_stretches(machine, blocks)
     spans = [(one.start, one.stop) for one in stretches]
     assert spans == [(24_000, 36_000)] * 2 + [(0, LENGTH)] * 4
-    learnt = carrying_stretches(machine.healthy, blocks)
+    learnt = healthy_stretches(machine, blocks, carry=True)
     assert [(one.start, one.stop) for one in learnt] == [(0, 24_000)] * 2
 
 
@@ -96,7 +97,9 @@ def test_windows_cover_their_stretch_and_know_their_recording(machine, blocks) -
 def test_the_handbook_rule_reads_kurtosis_and_level(machine, blocks) -> None:
     """Knocks once a turn are impulsive; the level is that of the carrying blocks."""
     stretches = judged_stretches(machine, blocks)
-    answers = handbook_answers(carrying_stretches(machine.healthy, blocks), stretches)
+    answers = handbook_answers(
+        healthy_stretches(machine, blocks, carry=True), stretches
+    )
     labels = [one.sample.label for one in stretches]
     sound, knocking = labels.index("healthy"), labels.index("one_tooth")
     assert answers.predicted[0, sound] == 0

@@ -23,9 +23,8 @@ from diagnose.baselines.indicator_models import (
 )
 from diagnose.baselines.rms_threshold import RmsThreshold
 from diagnose.data.windows import subset_segments, task_of
-from diagnose.report.novelty_report import novelty_caveats
 from diagnose.report.page import without_interval
-from diagnose.report.text import score_cell
+from diagnose.report.text import novelty_caveats, score_cell
 from diagnose.scoring.intervals import is_above
 from diagnose.scoring.machines import LEAST_UNITS
 from diagnose.scoring.metrics import (
@@ -284,7 +283,7 @@ def test_the_scarcest_groups_of_a_novelty_test_are_told():
     result = {"n_records": {"validation": 1000}, "resampled": {}}
     for kinds in (("machines", "units"), ("units", "machines")):
         result["resampled"] = dict(zip(kinds, (12, 3), strict=True))
-        (line,) = novelty_caveats({"new_class": result}, few_units=10)
+        (line,) = novelty_caveats({"new_class": result})
         assert line.startswith(f"new_class: only 3 {kinds[1]} in the test part")
     result["resampled"] = {"machines": 12, "units": 10}
-    assert novelty_caveats({"new_class": result}, few_units=10) == []
+    assert novelty_caveats({"new_class": result}) == []
