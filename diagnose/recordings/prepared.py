@@ -82,7 +82,6 @@ def prepare_recording(
     """
     read = _without_carried(description, _read(description, source), source)
     played = _played(description, inputs, source, read, SPEED_OPTION)
-    recording = played.recording
     sound = [
         _played(
             description,
@@ -111,16 +110,15 @@ def prepare_recording(
             for other, described in zip(sound, source.healthy, strict=True)
         ),
     )
-    n_recorded = recording.acceleration.shape[-1]
     return PreparedRecording(
         windows=inputs.of_recording(recorded),
-        recording=recording,
-        channels=played.channels,
+        recording=read.recording,
+        channels=read.channels,
         tracked=played.tracked,
         speed_rpm=played.speed_rpm,
         duration_s=inputs.seconds(
             window=description.window_samples / description.sampling_rate_hz,
-            recording=float(n_recorded / recording.sampling_rate),
+            recording=read.recording.duration,
         ),
         held_out=read.held_out,
     )
@@ -154,13 +152,11 @@ class _Played:
     ----------
     signal : (channel, sample)
     sampling_rate : Hz, of the signal
-    others : of `PreparedRecording`
+    tracked, speed_rpm : of `PreparedRecording`
     """
 
     signal: NDArray[np.float32]
     sampling_rate: float
-    recording: Recording
-    channels: tuple[str, ...]
     tracked: Tracked | None
     speed_rpm: float | None
 
@@ -206,8 +202,6 @@ def _played(
     return _Played(
         signal=signal.astype(np.float32),
         sampling_rate=rate,
-        recording=recording,
-        channels=read.channels,
         tracked=tracked,
         speed_rpm=speed,
     )

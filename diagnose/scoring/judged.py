@@ -23,7 +23,7 @@ from diagnose.scoring.predictions import Prediction
 if TYPE_CHECKING:
     from diagnose.data.windows import Task
 
-BOOTSTRAP_SEED = 20240607
+BOOTSTRAP_SEED, ANSWERS_SEED = 20240607, 20240608
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

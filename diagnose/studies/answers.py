@@ -18,6 +18,7 @@ from diagnose.scoring.conditions import by_condition, condition_columns
 from diagnose.scoring.detection_limit import HEALTHY, detection, size_columns
 from diagnose.scoring.intervals import with_interval
 from diagnose.scoring.judged import (
+    ANSWERS_SEED,
     Judged,
     drawn_scores,
     judged_answers,
@@ -30,8 +31,6 @@ from diagnose.scoring.window_length import by_window_length
 from diagnose.settings import TrainSettings
 from diagnose.studies.controls import best_on_validation
 from diagnose.studies.result_files import Entry, network_name
-
-ANSWERS_SEED = 20240608
 
 
 def protocol_answers(

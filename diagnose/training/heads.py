@@ -14,7 +14,7 @@ from diagnose.data.targets import GEARS, record_targets
 from diagnose.data.windows import FloatArray, IntArray, Task, WindowSet
 from diagnose.networks.network import Network, SiteNetwork
 from diagnose.scoring.intervals import interval_text, with_interval
-from diagnose.scoring.judged import Judged, judged_runs
+from diagnose.scoring.judged import ANSWERS_SEED, Judged, judged_runs
 from diagnose.scoring.metrics import (
     ACCURACY,
     over_records,
@@ -22,8 +22,6 @@ from diagnose.scoring.metrics import (
     score_with_interval,
 )
 from diagnose.scoring.predictions import Prediction
-
-BOOTSTRAP_SEED = 20240608
 
 
 def predict_heads(
@@ -93,7 +91,7 @@ def head_scores(
         records do not count
     faulted_gear : balanced accuracy with its interval, and chance
     """
-    rng = np.random.default_rng(BOOTSTRAP_SEED)
+    rng = np.random.default_rng(ANSWERS_SEED)
     record = runs[0].record
     truth = record_targets(task.dataset, record)
     known = record_targets(task.dataset, trained_on)
