@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.commands.console import replaced_file
 from gensig.commands.figures.panels import Figure, draw
 from gensig.commands.request import read_configuration
@@ -146,7 +146,7 @@ def columns(content: Mapping[str, Any], *keys: str) -> Iterator[tuple[Any, ...]]
     return zip(*(content[key] for key in keys), strict=True)
 
 
-def span(values: NDArray[np.float64], form: str) -> str:
+def span(values: Array, form: str) -> str:
     """Least and greatest value; a value that is 0 up to rounding has no sign."""
     ends = [
         value * (abs(value) >= 1e-9) + 0.0 for value in (values.min(), values.max())
@@ -154,7 +154,7 @@ def span(values: NDArray[np.float64], form: str) -> str:
     return " .. ".join(format(value, form) for value in ends)
 
 
-def highest(sound: NDArray[np.float64], faulty: NDArray[np.float64] | None) -> str:
+def highest(sound: Array, faulty: Array | None) -> str:
     """Highest stiffness of a tooth pair, healthy and faulty."""
     text = f"{sound.max():.4e} N/m"
     if faulty is not None:

@@ -9,11 +9,9 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
-
-Array = NDArray[np.float64]
 
 LATIN_HYPERCUBE, GRID = "latin_hypercube", "grid"
 DESIGNS = (LATIN_HYPERCUBE, "sobol", GRID)

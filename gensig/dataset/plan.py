@@ -9,8 +9,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Flags
 from gensig.dataset.columns import COLUMNS, IS_REFERENCE
 from gensig.dataset.folder.layout import PLAN_BYTES_LIMIT
 from gensig.dataset.schema import kind_of
@@ -84,7 +84,7 @@ class Plan:
         return int(self.columns["shard"][-1]) + 1
 
     @property
-    def is_reference(self) -> NDArray[np.bool_]:
+    def is_reference(self) -> Flags:
         """(record,) True for reference records, which are no examples."""
         if IS_REFERENCE not in self.columns:
             return np.zeros(self.n_records, dtype=bool)

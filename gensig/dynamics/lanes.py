@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gensig.arrays import Array, Flags, Integers
+from gensig.arrays import Array, Flags, FloatArray, Integers
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._layout import COLUMNS, FAR_NEAR
 from gensig.dynamics._vector import n_lanes
@@ -93,7 +92,7 @@ class MeshLanes:
         return [each.values[..., :COLUMNS].ravel() for each in self.rows]
 
 
-def side_by_side(values: Array, precision: str) -> NDArray[np.floating]:
+def side_by_side(values: Array, precision: str) -> FloatArray:
     """Values (lane, row...) flat, with the lanes along the last axis."""
     return np.ascontiguousarray(np.moveaxis(values, 0, -1), dtype=precision).ravel()
 

@@ -11,9 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gensig.arrays import Array
+from gensig.arrays import Array, FloatArray
 from gensig.errors import DatasetError
 from gensig.signals.averaging import interpolate
 from gensig.signals.resampling import rate_change
@@ -94,7 +93,7 @@ class Played:
         return np.asarray(interpolate(self._fine, position), dtype=float)
 
 
-def _finer(signal: NDArray[np.floating]) -> Array:
+def _finer(signal: FloatArray) -> Array:
     from scipy.signal import resample_poly
 
     return np.asarray(resample_poly(signal, FINER, 1, axis=-1))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.response import accelerations
 from gensig.options.compose import compose
 from gensig.papers.paper_figure import Curve, Panel, Paper, PaperFigure
@@ -13,8 +13,6 @@ from gensig.systems.pair_machine import GearPairMachine, running_pair
 from gensig.systems.registry import PairParts, helical_pair, read_sliced_pair
 from gensig.systems.run import Run
 from gensig.units import to_si
-
-Array = NDArray[np.float64]
 
 SYSTEM = "system=helical_pair"
 PRINTED = (

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Integers
 from gensig.dataset.distributions import (
     GRID,
     Distribution,
@@ -42,8 +42,8 @@ class DrawnPoints:
     levels : numbers of the levels of the keys that a grid crosses
     """
 
-    shares: Mapping[str, NDArray[np.float64]]
-    levels: Mapping[str, NDArray[np.int64]]
+    shares: Mapping[str, Array]
+    levels: Mapping[str, Integers]
 
     def values(
         self, vary: Mapping[str, Distribution], conditions: slice = slice(None)
@@ -62,7 +62,7 @@ class DrawnPoints:
 def draw_points(
     design: str,
     vary: Mapping[str, Distribution],
-    points: NDArray[np.int64],
+    points: Integers,
     rng: np.random.Generator,
 ) -> DrawnPoints:
     """Points of every varied key.
@@ -128,7 +128,7 @@ def fault_specs(
 
 def draw_class_faults(
     reader: InputReader,
-    points: NDArray[np.int64],
+    points: Integers,
     of_units: Sequence[InputReader] = (),
 ) -> dict[str, list[dict[str, Any]]]:
     """Faults of every class by its name, one a condition.
@@ -201,7 +201,7 @@ def _on_gear(fault: Mapping[str, Any], gear: str) -> dict[str, Any]:
 def draw_faults(
     of_units: Sequence[InputReader],
     fault: Mapping[str, Any],
-    points: NDArray[np.int64],
+    points: Integers,
     rng: np.random.Generator,
 ) -> list[dict[str, Any]]:
     """One complete fault a condition, its severity distribution drawn.

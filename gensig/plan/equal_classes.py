@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dataset.plan import Plan
 from gensig.errors import GensigError
 from gensig.faults.base import Fault
@@ -16,8 +16,6 @@ from gensig.plan.tooth_reach import passage_approach, tooth_reach
 from gensig.record.inputs import InputReader, row_faults
 from gensig.systems.base import Machine
 from gensig.units import from_si
-
-Array = NDArray[np.float64]
 
 SAME = 1e-9  # relative difference of static approaches that rounding alone can make
 # begins and ends the columns of drawn deviations of flanks

@@ -12,8 +12,8 @@ from functools import cache, cached_property
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.faults.base import Growth
 from gensig.faults.crack import Crack
 from gensig.faults.flank_form import Wear
@@ -29,8 +29,6 @@ from gensig.record.vibration_limit import limited_by_vibration
 from gensig.systems.base import Machine, MachineMesh, home_meshes
 from gensig.systems.growth_laws import crack_law, pit_law
 from gensig.systems.wear import OF_PAIR, flank_wear, wear_fault
-
-Array = NDArray[np.float64]
 
 SetPoint = tuple[float, float]
 """Speed in rad/s and torque in N m as the configuration gives them."""

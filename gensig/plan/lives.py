@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.faults.base import require_gears
 from gensig.faults.registry import fault_parts, read_faults
@@ -23,8 +23,6 @@ from gensig.record.options import GEAR_KEYS, UNIT_LOAD
 from gensig.record.streams import Stream, stream
 from gensig.systems.base import Machine
 from gensig.units import from_si
-
-Array = NDArray[np.float64]
 
 SPEED, TORQUE = "operating.speed_rpm", "operating.torque_nm"
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Integers
 from gensig.dataset.columns import IS_REFERENCE
 from gensig.dataset.distributions import LATIN_HYPERCUBE, Distribution
 from gensig.dataset.plan import Plan, record_ids, shard_rows
@@ -64,8 +64,8 @@ class Counts:
     n_units: int
     n_repeats: int
     n_conditions: int
-    condition_points: NDArray[np.int64]
-    fault_points: NDArray[np.int64]
+    condition_points: Integers
+    fault_points: Integers
 
 
 def make_plan(config: Configuration) -> Plan:

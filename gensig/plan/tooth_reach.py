@@ -6,15 +6,13 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.helical import pitches
 from gensig.faults.base import Fault
 from gensig.faults.broken import MissingTooth
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.systems.base import Machine
-
-Array = NDArray[np.float64]
 
 PER_PITCH = 512  # rolls in a base pitch
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.registry import FAULTS, fault_parts, without_vary
@@ -31,8 +31,6 @@ from gensig.sensing.instrument import Instrument
 from gensig.sensing.options import read_sensing
 from gensig.systems.registry import read_system
 from gensig.systems.run import CleanRecord
-
-Array = NDArray[np.float64]
 
 SPEED, TORQUE = "operating.speed_rpm", "operating.torque_nm"
 SPEED_SHARES = (0.25, 0.5, 1.0, 1.5, 2.0)  # of the set-point, where no speeds are given

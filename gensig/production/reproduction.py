@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array, Integers
 from gensig.dataset.folder.environment import environment
 from gensig.dataset.folder.failures import without_numbers
 from gensig.dataset.folder.joining import joined_folder, refuse_implants
@@ -106,9 +107,7 @@ def recorded_row(folder: Path, record: str) -> tuple[InputReader, dict[str, Any]
     return reader, plan.record(_position(folder, plan, record, flag="--record"))
 
 
-def _chosen(
-    folder: Path, plan: Plan, records: int | Sequence[str]
-) -> NDArray[np.int64]:
+def _chosen(folder: Path, plan: Plan, records: int | Sequence[str]) -> Integers:
     """Positions in the plan of so many records or of some, ascending, each once."""
     if isinstance(records, int):
         n_made = min(records, plan.n_records)
@@ -234,7 +233,7 @@ def _other_difference(stored: NDArray[Any], made: NDArray[Any]) -> float:
     return float(np.max(np.abs(wide - made.reshape(1, -1)) / _rms(wide)))
 
 
-def _rms(signal: NDArray[Any]) -> NDArray[np.float64]:
+def _rms(signal: NDArray[Any]) -> Array:
     """RMS of each channel, (channel,); one of zeros counts as 1."""
     level = np.sqrt(np.mean(np.square(signal, dtype=np.float64), axis=1))
     return np.where(level > 0.0, level, 1.0)

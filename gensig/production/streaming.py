@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gensig.arrays import Flags, Integers
 from gensig.dataset.plan import Plan
 from gensig.dataset.schema import DEFAULTS, stored_reason
 from gensig.dataset.splitting.protocols import make_splits, why_left_out
@@ -53,7 +54,7 @@ class RecordStream:
     config: Configuration
     epoch: int
     plan: Plan
-    numbers: NDArray[np.int64]
+    numbers: Integers
 
     @property
     def seed(self) -> int:
@@ -90,7 +91,7 @@ class RecordStream:
         return round(self.config["operating"]["duration_s"] * self.sampling_rate_hz)
 
     @property
-    def usable(self) -> NDArray[np.bool_]:
+    def usable(self) -> Flags:
         """(record,) True; records that fail are known only when they are made, by ``status``."""
         return np.ones(len(self), dtype=bool)
 
@@ -112,7 +113,7 @@ class RecordStream:
         """Names of the gears: pinion and wheel, of a drive line all of the line."""
         return list(read_machine(self.config).gears)
 
-    def n_teeth(self, gear: str) -> NDArray[np.int64]:
+    def n_teeth(self, gear: str) -> Integers:
         """Teeth of a gear, (record,): of each unit's gear, or of the one design."""
         name = f"n_teeth_{gear}"
         if name in self.plan.columns:
@@ -198,7 +199,7 @@ class RecordStream:
         share = f"{len(self)} of {self.plan.n_records} records"
         return f"RecordStream({share}, epoch {self.epoch}, classes {self.class_names})"
 
-    def _records(self, numbers: Sequence[int] | NDArray[np.int64]) -> list[Record]:
+    def _records(self, numbers: Sequence[int] | Integers) -> list[Record]:
         rows = [self.plan.record(int(number)) for number in numbers]
         reader = InputReader(self.config.with_entries(seed=self.seed))
         return [_as_stored(record) for record in simulate_records(reader, rows)]

@@ -16,6 +16,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dataset.folder.manifest import identity_hash
 from gensig.errors import DatasetError, SimulationError
 from gensig.faults.base import Fault
@@ -52,7 +53,6 @@ from gensig.systems.run import CleanRecord, Run, Start
 from gensig.systems.shaft_sensors import shaft_signals
 from gensig.version import __version__
 
-Array = NDArray[np.float64]
 Row = Mapping[str, Any]  # one row of a plan, by column
 MISSING = float("nan")
 MOST_MACHINES = 256  # that a reader keeps

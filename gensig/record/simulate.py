@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.mesh_state import MeshState, mesh_signals
 from gensig.errors import SimulationError
 from gensig.geometry.contact import GearPair
@@ -29,7 +30,6 @@ from gensig.systems.base import Machine
 from gensig.systems.run import CleanRecord
 from gensig.units import from_si
 
-Array = NDArray[np.float64]
 Signals = dict[str, NDArray[Any]]
 TWIN, TWIN_SOURCE = "healthy_twin", "healthy_twin_source"  # signals without the faults
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.registry import fault_parts, read_faults
 from gensig.life.options import WearOptions
@@ -19,8 +19,6 @@ from gensig.sensing.chain import power
 from gensig.systems.base import Machine
 from gensig.systems.wear import OF_PAIR, wear_fault
 from gensig.units import channel_unit
-
-Array = NDArray[np.float64]
 
 # the first gears in the first gearbox, as gensig simulate takes them
 ROW = {

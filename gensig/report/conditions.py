@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Flags
 from gensig.dataset.reader import Dataset
 from gensig.errors import DatasetError
 from gensig.report.values import has_lives
@@ -161,9 +162,7 @@ def healthy_beside(data: Dataset, index: int) -> Healthy | None:
     return _near(data, index, np.flatnonzero(of_unit & (label == "healthy")))
 
 
-def _earlier(
-    data: Dataset, index: int, of_condition: NDArray[np.bool_]
-) -> Healthy | None:
+def _earlier(data: Dataset, index: int, of_condition: Flags) -> Healthy | None:
     """The least damaged record of the same life and condition."""
     life, severity = data.column("life_id"), data.column("severity")
     less = of_condition & (life == life[index]) & (severity < severity[index])

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import FloatArray
 from gensig.dataset.reader import Dataset
 from gensig.errors import DatasetError
 from gensig.report.conditions import TWIN, Shown
@@ -16,8 +16,6 @@ from gensig.report.rotation_frequencies import Rotation
 from gensig.signals.envelope import envelope_spectrum
 from gensig.signals.spectrum import amplitude_spectrum
 from gensig.text.amounts import finite
-
-FloatArray = NDArray[np.floating]
 
 WAVEFORM_SAMPLES = 8192
 SPECTRUM_SAMPLES = 2**20  # longer records are read up to here

@@ -6,15 +6,14 @@ import bisect
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import FloatArray
 from gensig.dataset.reader import Dataset
 from gensig.report.values import Measured
 from gensig.signals.recording import STANDARD_GRAVITY
 from gensig.text.escaping import plain
 from gensig.text.page import Table
 
-FloatArray = NDArray[np.floating]
 # class, channel, RMS in m/s^2, velocity RMS in m/s
 Level = tuple[str, str, float, float]
 

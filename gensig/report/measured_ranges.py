@@ -9,15 +9,13 @@ from __future__ import annotations
 from collections import defaultdict
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import FloatArray
 from gensig.dataset.reader import Dataset
 from gensig.report.realism import Comparison, RangeKey, compare, read_ranges
 from gensig.report.values import Measured
 from gensig.signals.indicators import kurtosis, rms
 from gensig.signals.resampling import rate_change
-
-FloatArray = NDArray[np.floating]
 
 RATE = 5000.0  # Hz, of the measured records
 ALL, ELSEWHERE = "all conditions", "elsewhere"

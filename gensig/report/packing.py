@@ -6,7 +6,9 @@ import base64
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from gensig.arrays import FloatArray
 
 STEP_DB = 0.4  # of stored amplitudes: 5 % from one to the next, 102 dB in a byte
 COUNTS = 32767
@@ -24,14 +26,14 @@ def pack_floats(values: ArrayLike) -> str:
     return packed(values, "f4")
 
 
-def pack_signal(signal: NDArray[np.floating]) -> dict[str, Any]:
+def pack_signal(signal: FloatArray) -> dict[str, Any]:
     """A signal, (sample,), as 16-bit counts of `scale`."""
     scale = float(np.abs(signal).max(initial=0.0)) / COUNTS
     counts = np.rint(signal / (scale or 1.0))
     return {"scale": scale, "n": packed(counts, "i2")}
 
 
-def pack_amplitude(amplitude: NDArray[np.floating]) -> dict[str, Any]:
+def pack_amplitude(amplitude: FloatArray) -> dict[str, Any]:
     """Amplitudes as bytes in steps of `STEP_DB`: 255 is the largest, 0 is all below the range.
 
     Parameters

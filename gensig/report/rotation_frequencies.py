@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import FloatArray, Integers
 from gensig.dataset.cards.facts import gear_turns
 from gensig.dataset.reader import Dataset
 from gensig.errors import DatasetError
@@ -30,13 +31,13 @@ class Rotation:
                           tooth has it
     """
 
-    mesh: NDArray[np.floating]
-    drive: NDArray[np.floating]
-    n_teeth: dict[str, NDArray[np.int64]]
+    mesh: FloatArray
+    drive: FloatArray
+    n_teeth: dict[str, Integers]
     further: dict[str, float]
     gear: NDArray[np.str_]
 
-    def turns(self, gear: str) -> NDArray[np.floating]:
+    def turns(self, gear: str) -> FloatArray:
         """(record,) turns of a gear a second."""
         if gear in self.further:
             return self.drive / self.further[gear]

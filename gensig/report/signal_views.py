@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import FloatArray
 from gensig.dataset.cards.class_figures import first_channel
 from gensig.dataset.reader import Dataset
 from gensig.report.conditions import Choice, Condition, HealthyKind, Shown
@@ -24,8 +24,6 @@ from gensig.report.turns import (
     gear_teeth,
     turned_gears,
 )
-
-FloatArray = NDArray[np.floating]
 
 LEAST_TURNS = 3  # of an average that decides the opening record; assumed
 BESIDE: dict[HealthyKind, str] = {

@@ -9,10 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import FloatArray
 from gensig.report.packing import COUNTS
 from gensig.signals.resampling import rate_change
-
-FloatArray = NDArray[np.floating]
 
 SOUND_RATE = 16_000  # Hz
 SOUND_SECONDS = 1.0  # at most

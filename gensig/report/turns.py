@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import FloatArray
 from gensig.dataset.reader import Dataset
 from gensig.report.conditions import Shown
 from gensig.report.rotation_frequencies import GEARS, Rotation
 from gensig.signals.alignment import rotation as rotation_between
 from gensig.signals.averaging import time_synchronous_average
-
-FloatArray = NDArray[np.floating]
 
 TURN_POINTS = 4096  # at most, of a turn
 POINTS_PER_TOOTH = 64  # at most

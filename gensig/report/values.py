@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import FloatArray
 from gensig.dataset.columns import COLUMNS
 from gensig.dataset.reader import Dataset
 from gensig.dataset.schema import PARAMS
@@ -19,8 +20,6 @@ from gensig.report.packing import pack_floats, packed
 from gensig.report.rotation_frequencies import Rotation
 from gensig.signals.averaging import time_synchronous_average
 from gensig.signals.indicators import crest_factor, fm4, kurtosis, rms, sideband_ratio
-
-FloatArray = NDArray[np.floating]
 
 MOST_ROWS = 2000  # of the distributions
 MOST_MEASURED = 160  # records whose signals are read for the indicators

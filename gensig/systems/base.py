@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.integrator import Solver
 from gensig.dynamics.motion.dynamics import Dynamics
 from gensig.dynamics.pair import Body
@@ -31,8 +31,6 @@ from gensig.sensing.manufacturing import FurtherGear, Gearbox, Quality, Specimen
 from gensig.systems.run import CleanRecord, Run, Start
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.stiffness_curves import StiffnessCurves
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,14 +10,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError, GeometryError
 from gensig.mesh.modification import PLAIN, FlankModification, PairModification
 from gensig.mesh.sliced.slices import loaded_contact
 from gensig.systems.sliced_pair import SlicedPair
-
-Array = NDArray[np.float64]
 
 # of the search, in normal modules: depth and height of section 2 of the paper on transmission
 # error

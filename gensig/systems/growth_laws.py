@@ -9,8 +9,8 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.faults.crack import Crack
 from gensig.faults.pitting import DistributedPitting
 from gensig.geometry.contact import GearPair
@@ -25,8 +25,6 @@ from gensig.life.sliced_crack import sliced_crack_growth
 from gensig.material import Material
 from gensig.systems.base import Machine
 from gensig.systems.sliced_pair import SlicedPair
-
-Array = NDArray[np.float64]
 
 N_TORQUES = 3  # the shares of slices depend little on the torque
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError, GeometryError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
@@ -35,8 +35,6 @@ from gensig.mesh.thermal.paper_growth import (
 )
 from gensig.mesh.thermal.thermal_growth import GearGrowth, PairGrowth
 from gensig.systems.sliced_pair import SlicedPair
-
-Array = NDArray[np.float64]
 
 COLD, TRUE, CONTACT_RATIO = "cold", "true", "contact_ratio"
 APPARENT, SOFTENED = "apparent", "softened"

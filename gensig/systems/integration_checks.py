@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.decimation import in_band_error
 from gensig.dynamics.integrator import (
     BOUNCING,
@@ -25,7 +25,6 @@ from gensig.systems.base import Machine
 from gensig.systems.run import CleanRecord, Run
 from gensig.units import from_si
 
-Array = NDArray[np.float64]
 MachineT = TypeVar("MachineT", bound=Machine)
 
 # steps per sample above which bouncing records do not converge further

@@ -12,8 +12,8 @@ from functools import reduce
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Complex
 from gensig.dynamics.decimation import usable_band
 from gensig.dynamics.response import LinearMachine
 from gensig.operation.setpoint import Nominal
@@ -22,9 +22,6 @@ from gensig.sensing.tones import TURN, Tones
 from gensig.systems.base import Machine
 from gensig.systems.run import CleanRecord, Run, Start
 from gensig.units import SPEED
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # rad of the fastest tone from one made sample to the next: a cubic spline leaves 0.3^4 / 384
 SPLINE_PHASE = 0.3

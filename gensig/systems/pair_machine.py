@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import Self, final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.dynamics.backends.base import MOST_PAIRS
 from gensig.dynamics.helical import AXIAL_DOFS
 from gensig.dynamics.integrator import (
@@ -51,8 +51,6 @@ from gensig.systems.stiffness_curves import (
     stiffness_curves,
 )
 from gensig.systems.supports import in_gearbox
-
-Array = NDArray[np.float64]
 
 
 @final

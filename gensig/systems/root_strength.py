@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
 from gensig.life.root.root_stress import (
@@ -29,8 +29,6 @@ from gensig.options.configuration import Configuration
 from gensig.sensing.manufacturing import Quality
 from gensig.systems.registry import SLICED, read_sliced_pair, read_system
 from gensig.systems.sliced_pair import SlicedPair
-
-Array = NDArray[np.float64]
 
 N_PHASES = 200  # of one mesh period
 EDGE = 1e-9  # base pitches between entry or exit of a pair and the added phases

@@ -6,16 +6,13 @@ import math
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from gensig.arrays import Array
 from gensig.dynamics.mesh_state import MeshState
 from gensig.faults.base import Fault
 from gensig.geometry.contact import SIDES, GearPair
 from gensig.sensing.encoder import Disc
 from gensig.sensing.manufacturing import Gearbox, Specimen
 
-Array = NDArray[np.float64]
 MachineT_co = TypeVar("MachineT_co", covariant=True)
 
 # Results of the check of an integration:

@@ -14,7 +14,6 @@ from gensig.sensing.tachometer import draw_mark, pulse_train
 from gensig.systems.base import Machine
 from gensig.systems.run import CleanRecord, Start
 
-Array = NDArray[np.float64]
 SWITCHES = {
     "store_tacho": "tacho",
     "store_encoder": "encoder_angle",

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
 from gensig.material import Material
@@ -35,8 +35,6 @@ from gensig.mesh.sliced.slices import (
 from gensig.mesh.thermal.paper_growth import PaperGrowth
 from gensig.mesh.thermal.thermal_growth import PairGrowth
 from gensig.mesh.tooth_table import ToothTable
-
-Array = NDArray[np.float64]
 
 N_PHASES = 64  # per mesh period
 N_HARMONICS = 10

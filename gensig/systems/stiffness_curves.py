@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import Tooth
@@ -21,8 +21,6 @@ from gensig.mesh.pair_table import (
     structural_terms,
 )
 from gensig.mesh.tooth_table import ToothTable
-
-Array = NDArray[np.float64]
 
 
 class LoadedMesh(Protocol):

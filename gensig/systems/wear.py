@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.life.options import WearOptions, read_wear_options
@@ -16,8 +16,6 @@ from gensig.life.wear.wear_case import WearCase, wear_case
 from gensig.options.configuration import Configuration
 from gensig.systems.registry import SIDES, read_sliced_pair
 from gensig.systems.sliced_pair import SlicedPair
-
-Array = NDArray[np.float64]
 
 OF_PAIR = {side: side for side in SIDES}
 N_PROFILE = 65  # depths along the flank in a fault of kind wear

@@ -13,13 +13,11 @@ from pathlib import Path
 from typing import TextIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import ConfigError
 from gensig.text.csv_tables import read_rows
 from gensig.text.ordinary_file import is_refused, open_ordinary
-
-Array = NDArray[np.float64]
 
 MOST_BYTES = 500_000_000
 RATE_TOLERANCE = 1e-3  # relative

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Flags
 from gensig.errors import SimulationError
 from gensig.options.configuration import Configuration
 from gensig.plan.make import make_plan
@@ -23,8 +23,6 @@ from gensig.signals.mesh_motion import Motion, Teeth
 from gensig.signals.recording import Recording
 from gensig.signals.transfer.order_lines import find_lines
 from gensig.twin.grade import median_of_finite, sideband_ratios
-
-Array = NDArray[np.float64]
 
 N_RECORDS = 12  # healthy, each of a different set of gears
 PLAN: Mapping[str, Any] = {
@@ -82,7 +80,7 @@ class Check:
         return np.asarray(_within(self.measured_db, self.twin_db).mean(axis=1))
 
     @property
-    def agrees(self) -> NDArray[np.bool_]:
+    def agrees(self) -> Flags:
         """True where the measured indicator lies between the twin's least and greatest.
 
         (sensor, indicator).
@@ -90,7 +88,7 @@ class Check:
         return _within(self.measured, self.twin)
 
 
-def _within(measured: Array, records: Array) -> NDArray[np.bool_]:
+def _within(measured: Array, records: Array) -> Flags:
     low, high = records.min(axis=0), records.max(axis=0)
     return np.asarray((measured >= low) & (measured <= high))
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Flags
 from gensig.signals.mesh_motion import Motion, Teeth
 from gensig.signals.recording import Recording
 from gensig.signals.transfer.order_lines import Lines, find_lines
@@ -25,8 +25,6 @@ from gensig.twin.grade import (
 )
 from gensig.twin.speed import find_motion
 from gensig.units import from_si, to_si
-
-Array = NDArray[np.float64]
 
 # the driving gear's bearing along the line of action, where the path begins
 SOURCE_CHANNEL = "pinion_y"
@@ -66,7 +64,7 @@ class Fit:
     grade: Grade
     gain_frequency: Array
     gain: Array
-    heard: NDArray[np.bool_]
+    heard: Flags
     noise_frequency: Array
     density: Array
     snr: Array

@@ -9,16 +9,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.errors import SimulationError
 from gensig.sensing.manufacturing import draw_specimen
 from gensig.signals.mesh_motion import Teeth
 from gensig.signals.transfer.order_lines import Lines, find_lines
 from gensig.systems.base import Machine, simulate_together
 from gensig.systems.run import CleanRecord, Run, Start
-
-Array = NDArray[np.float64]
 
 GRADES = (1.0, 3.0, 5.0, 7.0, 9.0, 11.0)
 N_SPECIMENS = 6  # sets of gears simulated at each grade

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.commands.figures.panels import (
     FAULTY,
     QUARTERS,
@@ -32,7 +32,7 @@ def damper_figure(
     states: Mapping[str, DamperState],
     dampers: Sequence[TorsionalDamper],
     mesh: int,
-    speeds: NDArray[np.float64],
+    speeds: Array,
 ) -> Figure:
     """The largest tooth force, its cycle and orders, and root stress, before and after."""
     by_speed, by_angle, by_order, stress = _curves(states, mesh, RPM * speeds)
@@ -86,7 +86,7 @@ def damper_figure(
 
 
 def _curves(
-    states: Mapping[str, DamperState], mesh: int, rpm: NDArray[np.float64]
+    states: Mapping[str, DamperState], mesh: int, rpm: Array
 ) -> tuple[list[Mark], ...]:
     """Curves of both states on each of the four panels."""
     by_speed: list[Mark] = []

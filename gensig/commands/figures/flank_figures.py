@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.commands.figures.panels import (
     FAULTY,
     FIRST_SLICE,
@@ -24,8 +24,6 @@ from gensig.commands.figures.panels import (
 )
 from gensig.systems.flank_optimum import Optimum
 from gensig.systems.sliced_pair import SlicedPair, TransmissionError
-
-Array = NDArray[np.float64]
 
 
 def transmission_error_figure(system: SlicedPair, result: TransmissionError) -> Figure:

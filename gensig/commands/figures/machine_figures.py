@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.commands.figures.panels import (
     COLORS,
     FAULTY,
@@ -33,7 +34,7 @@ USABLE_SHARE = 0.39  # of the sampling rate
 PAIRS = ("pair about to enter", "newest pair", "pair before it", "pair before that")
 
 # label, color and signal (sample,) of the records in a figure
-Signals: TypeAlias = Sequence[tuple[str | None, str, NDArray[np.float64]]]
+Signals: TypeAlias = Sequence[tuple[str | None, str, Array]]
 
 
 def stiffness_figure(

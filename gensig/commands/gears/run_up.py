@@ -12,6 +12,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.commands.figures.machine_figures import shown_channel
 from gensig.commands.lines.results import turner
 from gensig.driveline.machine import LineMachine
@@ -116,13 +117,13 @@ def with_traces(reader: InputReader) -> InputReader:
     return InputReader(config.with_keys("dataset", store_operating=True))
 
 
-def shaft_angle(machine: Machine, record: Record) -> NDArray[np.float64]:
+def shaft_angle(machine: Machine, record: Record) -> Array:
     """Angle of the pinion from its stored speed, (sample,) rad."""
     speed = record.signals["shaft_speed"].astype(np.float64)
     return np.cumsum(speed) / machine.sensing.sampling_rate
 
 
-def is_steady(angle: NDArray[np.float64]) -> bool:
+def is_steady(angle: Array) -> bool:
     """True where a shaft turns on, and its speed changes by `LEAST_CHANGE` or less."""
     return bool(np.all(np.diff(angle) > 0.0)) and speed_change(angle) <= LEAST_CHANGE
 

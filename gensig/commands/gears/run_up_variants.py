@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import FloatArray
 from gensig.commands.console import remark, step
 from gensig.commands.figures.variants_figure import variants_figure
 from gensig.commands.gears.run_up import (
@@ -46,11 +46,11 @@ class Vibration:
     mesh : (speed,) m/s2      of the mesh and its harmonics, `HARMONICS` in all
     """
 
-    speed: NDArray[np.floating]
-    total: NDArray[np.floating]
-    mesh: NDArray[np.floating]
+    speed: FloatArray
+    total: FloatArray
+    mesh: FloatArray
 
-    def at(self, speed: NDArray[np.floating]) -> Vibration:
+    def at(self, speed: FloatArray) -> Vibration:
         """The same at other speeds, by straight lines; NaN beyond its ends."""
         total, mesh = (
             np.interp(speed, self.speed, values, np.nan, np.nan)

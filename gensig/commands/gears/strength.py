@@ -8,8 +8,8 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.commands.figures.strength_figure import root_stress_figure
 from gensig.commands.output import Answer, answered
 from gensig.errors import ConfigError
@@ -102,7 +102,7 @@ def root_stress_content(
     }
 
 
-def _gear_content(gear: GearStress, stress: NDArray[np.float64]) -> dict[str, Any]:
+def _gear_content(gear: GearStress, stress: Array) -> dict[str, Any]:
     factors, safety = gear.factors, gear.safety
     return {
         "root_stress_mpa": stress * 1e-6,

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.commands.console import remark
 from gensig.commands.figures.wear_figure import wear_life_figure
 from gensig.commands.gears.wear_summary import wear_lines
@@ -32,8 +32,6 @@ from gensig.options.configuration import Configuration
 from gensig.record.inputs import InputReader
 from gensig.record.vibration_limit import WornVibration, limited_by_vibration
 from gensig.systems.wear import read_wear_case, wear_fault
-
-Array = NDArray[np.float64]
 
 # shares of the configured torque and speed
 MAP_TORQUES = np.geomspace(0.25, 1.5, 6)

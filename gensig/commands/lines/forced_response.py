@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.commands.figures.line_figures import response_figure
 from gensig.commands.lines.engine_in_time import (
     WITHOUT,
@@ -237,7 +237,7 @@ def _run(
     linear, _ = line.linear()
     indices = [line.drive.numbers.index(node) for node in nodes]
 
-    def torques_at(speed: float) -> NDArray[np.float64]:
+    def torques_at(speed: float) -> Array:
         load = line.load_at(run_torque, speed / line.engine.reference.speed)
         return line.on_line(line.torques(speed, load))
 

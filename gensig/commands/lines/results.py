@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.driveline.engine_dampers import DynamicRootStress, ToothLoad
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.engine_torques import Engine
@@ -19,8 +19,6 @@ from gensig.driveline.sweep import Sweep
 from gensig.errors import ConfigError
 from gensig.life.root.strength import reliability
 from gensig.units import from_si
-
-Array = NDArray[np.float64]
 
 MOST_SPEEDS = 2000
 RPM = from_si("speed_rpm", 1.0)

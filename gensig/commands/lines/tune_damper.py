@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
+from gensig.arrays import Array
 from gensig.commands.console import step
 from gensig.commands.figures.damper_figure import damper_figure
 from gensig.commands.lines.results import (
@@ -36,8 +36,6 @@ from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
 from gensig.systems.root_strength import RootStrength
 from gensig.units import from_si, to_si
-
-Array = NDArray[np.float64]
 
 GROUP = "system"
 DIGITS = 4  # of the sizes that are written, and judged

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import FloatArray
 from gensig.dataset.cards.facts import channel_units
 from gensig.dataset.folder.layout import FIGURES
 from gensig.dataset.reader import Dataset
@@ -40,10 +40,10 @@ class ClassExample:
     """
 
     title: str
-    time: NDArray[np.floating]
-    signal: NDArray[np.floating]
-    frequency: NDArray[np.floating]
-    amplitude: NDArray[np.floating]
+    time: FloatArray
+    signal: FloatArray
+    frequency: FloatArray
+    amplitude: FloatArray
     mesh_frequency: float
 
 

@@ -3,8 +3,8 @@
 from contextlib import suppress
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Flags
 from gensig.dataset.columns import GEAR_COLUMNS, GEAR_NAMES, GEAR_PINION_TURNS
 from gensig.dataset.reader import Dataset
 from gensig.dataset.splitting.dealing import GROUP_NAMES
@@ -69,7 +69,7 @@ def geometry_facts(data: Dataset) -> dict[str, object]:
     return facts | gear_facts(data)
 
 
-def class_examples(data: Dataset) -> dict[str, NDArray[np.bool_]]:
+def class_examples(data: Dataset) -> dict[str, Flags]:
     """(record,) by class name: the records of each class that are no reference.
 
     The classes of the data set stand first, in their order.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Integers
 from gensig.dataset.reader import Dataset
 from gensig.dataset.splitting.protocols import PROTOCOLS
 from gensig.dataset.splitting.split_check import split_problems
@@ -29,9 +30,9 @@ class Stretches:
     cut : bool                        whether the protocol cuts records, or deals whole ones
     """
 
-    record: NDArray[np.int64]
-    start: NDArray[np.int64]
-    stop: NDArray[np.int64]
+    record: Integers
+    start: Integers
+    stop: Integers
     subset: NDArray[np.str_]
     cut: bool
 

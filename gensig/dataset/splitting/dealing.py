@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.arrays import Array, Flags, Integers
 from gensig.dataset.plan import Plan
 from gensig.dataset.splitting.splits import SUBSETS, SplitTable
 
@@ -43,12 +44,12 @@ class Deal:
     """
 
     column: str
-    usable: NDArray[np.bool_]
-    groups: NDArray[np.int64] | None = None
+    usable: Flags
+    groups: Integers | None = None
     min_groups: int = len(SUBSETS)
     test_share: float = 0.2
     validation_share: float = VALIDATION_SHARE
-    for_test: NDArray[np.float64] | None = None
+    for_test: Array | None = None
     every_class: bool = True
 
 
@@ -100,7 +101,7 @@ def _counted(n: int, column: str) -> str:
 
 
 def _best_tested(
-    side: NDArray[np.integer], worth: NDArray[np.float64], rng: np.random.Generator
+    side: NDArray[np.integer], worth: Array, rng: np.random.Generator
 ) -> NDArray[np.integer]:
     """The same numbers of groups a side, those of the largest worth tested on.
 
@@ -112,9 +113,7 @@ def _best_tested(
     return dealt
 
 
-def _table(
-    plan: Plan, subset: NDArray[np.integer], usable: NDArray[np.bool_]
-) -> SplitTable:
+def _table(plan: Plan, subset: NDArray[np.integer], usable: Flags) -> SplitTable:
     """Whole records in the order of the plan."""
     kept = np.flatnonzero(usable[subset, np.arange(plan.n_records)])
     return SplitTable(

@@ -10,8 +10,8 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gensig.arrays import Array, Flags, Integers
 from gensig.dataset.plan import Plan
 from gensig.dataset.splitting.dealing import Deal, deal_groups
 from gensig.dataset.splitting.splits import SUBSETS, SplitTable
@@ -33,7 +33,6 @@ SEVERITY_TEST_SHARE = (
 
 # Ids of a machine and of what it is made of.
 MACHINE_COLUMNS = ("specimen_id", "gearbox_id", "unit_id")
-Mask = NDArray[np.bool_]
 Outcome = SplitTable | str
 HEALTHY = "[]"  # `faults_json` of a record without fault
 
@@ -158,7 +157,7 @@ def _new_machine(plan: Plan, rng: np.random.Generator) -> Outcome:
     return deal_groups(plan, deal, rng)
 
 
-def _connected_machines(plan: Plan) -> NDArray[np.int64]:
+def _connected_machines(plan: Plan) -> Integers:
     """(record,) Number of the connected component of the record's machine.
 
     Units are connected that share a set of gears or a gearbox, also through others.
@@ -203,7 +202,7 @@ def _cross_range(
 
 
 def _unseen_severity(
-    hold: Callable[[NDArray[np.float64]], Mask], plan: Plan, rng: np.random.Generator
+    hold: Callable[[Array], Flags], plan: Plan, rng: np.random.Generator
 ) -> Outcome:
     """A quarter of each fault's severities tested on, in units that are not trained on.
 
@@ -249,14 +248,16 @@ def _open_set(plan: Plan, rng: np.random.Generator) -> Outcome:
     return _tested_on_everything(plan, known, rng)
 
 
-def _tested_on_everything(plan: Plan, known: Mask, rng: np.random.Generator) -> Outcome:
+def _tested_on_everything(
+    plan: Plan, known: Flags, rng: np.random.Generator
+) -> Outcome:
     """Known records alone for training and validation, all records of the tested units."""
     usable = np.stack([known, known, np.ones_like(known)])
     deal = Deal(column="unit_id", usable=usable, every_class=False)
     return deal_groups(plan, deal, rng)
 
 
-def _outer(values: NDArray[np.float64]) -> Mask:
+def _outer(values: Array) -> Flags:
     """(record,) True above the cut that leaves nearest to a quarter of the values above it.
 
     No value if all are equal.
@@ -269,7 +270,7 @@ def _outer(values: NDArray[np.float64]) -> Mask:
     return values > cut
 
 
-def _inner(values: NDArray[np.float64]) -> Mask:
+def _inner(values: Array) -> Flags:
     """(record,) True in the middle quarter by rank.
 
     At least one value, never the least or largest.
@@ -295,7 +296,7 @@ def _cross(column: str, sign: float, stream: int) -> Protocol:
     return Protocol(stream=stream, make=make, needs=(column,))
 
 
-def _severity(hold: Callable[[NDArray[np.float64]], Mask], stream: int) -> Protocol:
+def _severity(hold: Callable[[Array], Flags], stream: int) -> Protocol:
     make = functools.partial(_unseen_severity, hold)
     return Protocol(stream=stream, make=make, needs=("severity",))
 
