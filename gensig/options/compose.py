@@ -6,10 +6,10 @@ instantiated.
 
 from __future__ import annotations
 
+import copy
 import difflib
 import functools
 import itertools
-import pickle
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -116,8 +116,7 @@ def _set_in_options(config_name: str, words: tuple[str, ...]) -> dict[str, Any]:
             chosen.append(word)
         else:
             changes.append((key, value))
-    # a third of the time of copy.deepcopy
-    config = pickle.loads(pickle.dumps(_chosen_options(config_name, tuple(chosen))))
+    config = copy.deepcopy(_chosen_options(config_name, tuple(chosen)))
     for key, value in changes:
         OmegaConf.update(config, key, value, merge=True)
     return _resolved(config)
