@@ -21,7 +21,7 @@ LONG_FUNCTIONS = {"gensig/dynamics/_tables.py:gather"}
 MOST_CONDITIONALS = 5  # conditional expressions per 1,000 lines
 # Names, numbers, operators and texts. The house may not grow past these: a change that needs more
 # says so by raising a number here, and one that deletes lowers it.
-MOST_TOKENS = {"gensig": 451_000, "diagnose": 155_000, "tests": 536_000}
+MOST_TOKENS = {"gensig": 446_000, "diagnose": 155_000, "tests": 532_000}
 COUNTED = (tokenize.NAME, tokenize.NUMBER, tokenize.OP, tokenize.STRING)
 # Private modules that modules of other folders know; none may be added.
 BORROWED: dict[str, set[str]] = {}
@@ -63,11 +63,10 @@ def test_import_is_light(statement: str, absent: tuple[str, ...]) -> None:
 # Allow-list: the folders of its own package that a folder or a module of the top level imports.
 GENSIG = {
     "cli": "commands compilation terminal version",
-    "commands": "dataset driveline dynamics errors execution faults geometry implants life "
-    "measured mesh "
-    "operation options papers plan production record report signals systems terminal text "
-    "twin units",
-    "dataset": "errors signals text version",
+    "commands": "arrays dataset driveline dynamics errors execution faults geometry implants life "
+    "measured mesh operation options papers plan production record report signals systems terminal "
+    "text twin units",
+    "dataset": "arrays errors signals text version",
     "driveline": (
         "arrays dynamics errors faults geometry life material mesh operation options sensing "
         "systems text units"
@@ -83,30 +82,30 @@ GENSIG = {
     "mesh": "arrays compilation errors geometry material options units",
     "operation": "arrays errors options text units",
     "options": "errors text units",
-    "papers": "driveline dynamics faults life operation options sensing signals systems text "
-    "units",
+    "papers": "arrays driveline dynamics faults life operation options sensing signals systems "
+    "text units",
     "plan": (
-        "dataset dynamics errors faults geometry life mesh operation options record "
+        "arrays dataset dynamics errors faults geometry life mesh operation options record "
         "systems units"
     ),
     "production": (
-        "compilation dataset dynamics errors execution faults options plan record "
+        "arrays compilation dataset dynamics errors execution faults options plan record "
         "sensing systems terminal text units version"
     ),
     "record": (
-        "dataset driveline dynamics errors faults geometry life operation options sensing "
+        "arrays dataset driveline dynamics errors faults geometry life operation options sensing "
         "systems units version"
     ),
-    "report": "dataset errors signals text",
+    "report": "arrays dataset errors signals text",
     "sensing": "arrays dynamics errors faults geometry options signals text units",
     "signals": "arrays errors text",
     "systems": (
-        "dynamics errors faults geometry life material mesh operation options sensing "
+        "arrays dynamics errors faults geometry life material mesh operation options sensing "
         "units"
     ),
     "terminal": "errors options text",
-    "text": "errors",
-    "twin": "dynamics errors options plan record sensing signals systems text units",
+    "text": "arrays errors",
+    "twin": "arrays dynamics errors options plan record sensing signals systems text units",
     "units": "errors",
 }
 DIAGNOSE = {
