@@ -27,7 +27,7 @@ assert added < sound.max() - sound.min()
 ripple = {name: values.max() - values.min() for name, values in one_period.items()}
 assert ripple["helical 61/132"] < 0.2 * ripple["spur 23/84"]
 assert units[0].isdisjoint(units[2]) and units[1].isdisjoint(units[2])
-assert 0.1 < shuffled < 0.35 < interval.low
+assert 0.1 < shuffled < 0.35 < low
 assert found[0] > 0.5 and found[3] > 0.7
 """
 

@@ -25,9 +25,18 @@ CONFIGURATION = {
     "gensig/systems/registry",
     "gensig/systems/root_strength",
     "gensig/systems/wear",
+    # verbs: questions on the machine of a configuration, and what hands it to them
+    "gensig/commands/output",
+    "gensig/commands/gears/flanks",
+    "gensig/commands/gears/modify",
+    "gensig/commands/gears/physics",
+    "gensig/commands/gears/run_up_variants",
+    "gensig/commands/gears/strength",
+    "gensig/commands/gears/wear",
+    "gensig/commands/lines/forced_response",
+    "gensig/commands/lines/tune_damper",
     # take it from a caller or a folder, and give it to a reader
     "diagnose/commands/train",
-    "diagnose/detectability/pairs",
     "diagnose/training/study_folder",
     "gensig/commands/gears/simulate",
     "gensig/commands/lines/modes",
@@ -40,7 +49,7 @@ CONFIGURATION = {
     "gensig/production/streaming",
     "gensig/twin/check",
 }
-MOST_SIGNATURES = 30  # functions that take or return one
+MOST_SIGNATURES = 37  # functions that take or return one; a quarter of them are verbs
 
 
 def names_it(node: ast.AST) -> bool:
