@@ -76,6 +76,8 @@ def test_the_figure_names_the_best_test(crack, tmp_path):
         tests.add(f"best: pinion_y, up to {BANDS[band] / 1e3:.3g} kHz")
         assert np.nanmin(values[..., band]) > np.nanmin(values)  # the worst is another
     assert set(re.findall(r"best: pinion_y, up to \S+ kHz", text)) == tests
+    across_and_up = re.findall(r"<!-- (10|20|900|1800) -->", text)[:4]
+    assert across_and_up == ["10", "20", "900", "1800"]
 
 
 def test_a_fault_of_no_size_is_refused():

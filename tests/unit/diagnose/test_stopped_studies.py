@@ -217,3 +217,10 @@ def test_a_multirun_goes_on_with_what_it_lacks(brief, capsys):
     assert main(words) == 0
     assert brief.made == [first.name, second.name]
     refuses(capsys, words, "exists and is not an empty folder")
+
+
+def test_a_multirun_writes_nothing_beside_files_of_others(brief, capsys):
+    Path("levels", "empty").mkdir(parents=True)
+    Path("levels", "notes.txt").write_text("mine")
+    words = ["train", "-m", "data=good", "out=levels", "normalise=rms,none"]
+    refuses(capsys, words, "exists and is not an empty folder")

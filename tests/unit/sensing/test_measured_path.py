@@ -47,8 +47,8 @@ def frequency_file(path, response, *, low=0.0, high=25_600.0, step=10.0):
     )
 
 
-def read(file):
-    return read_responses(MeasuredPath(file=file), CHANNELS, SENSORS, RATE)
+def read(file, rate=RATE):
+    return read_responses(MeasuredPath(file=file), CHANNELS, SENSORS, rate)
 
 
 def mode(frequency, natural=2000.0, damping=0.03):
@@ -90,6 +90,14 @@ def test_frequency_response_of_a_mode_rings_as_the_mode_does(tmp_path):
         expected,
         atol=0.01 * np.abs(expected).max(),
     )
+
+
+def test_one_file_has_responses_at_every_rate(tmp_path):
+    file = frequency_file(tmp_path / "f.csv", mode)
+    assert [read(file, rate).sampling_rate for rate in (RATE, 0.5 * RATE)] == [
+        RATE,
+        0.5 * RATE,
+    ]
 
 
 def test_refused_files(tmp_path):

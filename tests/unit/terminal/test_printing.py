@@ -112,9 +112,10 @@ def test_the_bar_of_a_run_counts_records_of_all(terminal):
 
 
 def test_the_bar_shows_brackets_of_a_name_as_they_are(terminal):
-    with _bar(1, "training") as advance:
+    with _bar(2, "training") as advance:
         advance("set [bold]a[/bold]")
     assert "set [bold]a[/bold]" in terminal.getvalue()
+    assert "1/2" in terminal.getvalue()
 
 
 def test_the_log_of_a_run_is_escaped(tmp_path):

@@ -201,6 +201,8 @@ def test_a_figure_of_lives_ends_at_the_failure_on_the_right(monkeypatch):
     assert late <= 0 < level <= early
     assert low <= 0 < level <= high
     assert early - late < 1.2 * level
+    cone = panel.collections[0].get_paths()[0].vertices
+    assert cone[cone[:, 0] == level, 1].min() == pytest.approx(0.8 * level)
 
 
 def test_a_bound_above_the_early_level_is_known_and_one_below_is_not():

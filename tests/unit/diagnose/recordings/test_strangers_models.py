@@ -196,6 +196,11 @@ def test_only_ordinary_files_are_read(cnn, name, kind):
     assert check_model(cnn).problems
 
 
+def test_of_a_description_that_cannot_be_read_no_file_is_compared(cnn):
+    (cnn / "model.json").write_text("{")
+    assert check_model(cnn).content()["n_files"] == 0
+
+
 def test_an_older_model_opens_with_a_note(template, cnn):
     content = json.loads((cnn / "model.json").read_text())
     old = {key: content[key] for key in content if key not in ("files", "sha256")}
