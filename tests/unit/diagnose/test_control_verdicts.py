@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from fake_dataset import FakeDataset
 from runs import FAST, by_unit, metrics_of, train
+from scipy.stats import binom
 
 from diagnose.baselines.base import Baseline, MethodText, Role
 from diagnose.baselines.indicator_models import INDICATOR_INPUT
@@ -83,7 +84,11 @@ def test_a_method_that_returns_labels_fails_its_control(cheated):
     for name in ("cnn", "rms_threshold"):
         assert controls[name]["holds"]
         assert controls[name]["ran"] == ["label shuffle", "canaries"]
-        assert controls[name]["canaries"]["probability"] > 1e-4
+        followed = controls[name]["canaries"]
+        assert followed["probability"] > 1e-4
+        chance = binom(followed["n_records"], 1 / len(FakeDataset(**SMALL).class_names))
+        as_many = range(followed["n_followed"], followed["n_records"] + 1)
+        assert followed["probability"] == pytest.approx(chance.pmf(as_many).sum())
     (handed,) = controls["handed"]["failed"]
     assert handed.startswith(
         "its answers follow random labels of the test records (16 of"
