@@ -15,6 +15,7 @@ from numpy.testing import assert_allclose
 from gensig import open_dataset
 from gensig.cli import main
 from gensig.commands.new.data_sheet import DataSheet, gear_option
+from gensig.commands.new.gearbox import _shaft
 from gensig.commands.new.line_tables import shafting_table, torsional_stiffness
 from gensig.commands.new.stages import read_gearbox, shaft_diameters
 from gensig.driveline.reading import read_line_machine
@@ -59,6 +60,11 @@ def test_a_pair_is_a_gearbox_of_one_stage():
     (stage,) = gearbox(teeth=[29, 100], module=[1.5]).stages
     pair = DataSheet(name="a", teeth=(29, 100), module=1.5, speed=1500.0, torque=10.0)
     assert stage.gear == gear_option(pair).gear
+
+
+def test_the_stress_of_a_shaft_is_that_of_a_round_bar():
+    stress = _shaft(1500.0, 60.0, 20.0)["torsional_stress_mpa"]
+    assert stress == pytest.approx(38.2, rel=1e-3)
 
 
 def test_edges_lead_from_the_motor_to_the_load():
