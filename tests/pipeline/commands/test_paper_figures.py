@@ -103,6 +103,12 @@ def test_orders_peak_near_the_modes_that_were_measured(written, number):
         for order, mode in (("order 1", 28.7), ("order 5", 69.9), ("order 10", 169.4)):
             if label == order:
                 assert abs(hz[angle.argmax()] / mode - 1.0) < 0.05
+                assert 1e-7 < 10.0 ** angle.min() < 10.0 ** angle.max() < 90.0
+
+
+def test_transmission_errors_are_micrometres(written):
+    curves, _ = points(written("helical_error"), "helical_error_5")
+    assert all(0.01 < np.ptp(error) < 100.0 for _, error in curves.values())
 
 
 def test_dampers_lower_the_root_stress_that_pairs_share(written):

@@ -13,8 +13,19 @@ from gensig.faults.base import faulty_teeth
 from gensig.geometry.contact import corner_gap_by_pinion
 from gensig.geometry.tooth import healthy_tooth
 from gensig.mesh.fillet_foundation import ExtrapolationWarning
+from gensig.mesh.load_distribution import sound_load
 from gensig.mesh.local_contact import contact_law
 from gensig.mesh.pair_table import flank_sides, pair_table, slice_bending
+
+
+def test_softer_teeth_share_the_load_in_another_way(xiamen):
+    system = xiamen
+    soft = replace(system.material, youngs_modulus=0.1 * system.material.youngs_modulus)
+    loads = [
+        sound_load(system.pair, material, system.mesh, 1000.0)
+        for material in (system.material, soft)
+    ]
+    assert np.abs(loads[0] - loads[1]).max() > 1.0
 
 
 def test_sound_teeth_have_the_corner_gap_and_nothing_else(xiamen):

@@ -19,6 +19,7 @@ from diagnose.networks.registry import build_model
 from diagnose.recordings.model_check import check_model, models_in
 from diagnose.recordings.registry import open_network, shipped_network
 from diagnose.recordings.stored_network import require_finite
+from diagnose.training.description_checks import LONGEST_TEXT, text
 from diagnose.training.model_files import content_digest, tensors_of
 from gensig.errors import DatasetError, GensigError
 
@@ -200,6 +201,12 @@ def test_of_a_description_that_cannot_be_read_nothing_is_counted(cnn):
     (cnn / "model.json").write_text("{")
     counted = check_model(cnn).content()
     assert (counted["n_files"], counted["n_weights"]) == (0, 0)
+
+
+@pytest.mark.parametrize("value", ["", "a" * (LONGEST_TEXT + 1), 1])
+def test_a_text_has_a_length(value):
+    with pytest.raises(ValueError, match="is no text of 1 to"):
+        text("method", value)
 
 
 def test_an_older_model_opens_with_a_note(template, cnn):
