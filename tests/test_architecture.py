@@ -21,7 +21,7 @@ LONG_FUNCTIONS = {"gensig/dynamics/_tables.py:gather"}
 MOST_CONDITIONALS = 5  # conditional expressions per 1,000 lines
 # Names, numbers, operators and texts. The house may not grow past these: a change that needs more
 # says so by raising a number here, and one that deletes lowers it.
-MOST_TOKENS = {"gensig": 446_000, "diagnose": 155_000, "tests": 532_000}
+MOST_TOKENS = {"gensig": 446_000, "diagnose": 155_000, "tests": 533_000}
 COUNTED = (tokenize.NAME, tokenize.NUMBER, tokenize.OP, tokenize.STRING)
 # Private modules that modules of other folders know; none may be added.
 BORROWED: dict[str, set[str]] = {}

@@ -66,6 +66,15 @@ def deviations(line, nodes, settling, duration=0.15):
     )
 
 
+def test_an_engine_starts_in_its_vibration_and_a_motor_at_rest():
+    for experiment, vibrates in (("engine_test_point", True), ("two_stage", False)):
+        system = load_system(f"experiment={experiment}")
+        dynamics = system.line(Run(system=system, faults=())).dynamics
+        deflection, rate = dynamics.start(0.0)
+        assert rate.any() == vibrates
+        assert (deflection != dynamics.static_start(0.0)).any() == vibrates
+
+
 def test_without_play_it_is_the_linear_line():
     """In the limit of small torques, for they are read at the angle of their own shaft, its
     vibration included.

@@ -1,6 +1,8 @@
 """Words of a folder that name the sources of a set of implants."""
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -8,7 +10,13 @@ from refusals import refused
 
 from gensig.dataset.folder.layout import OVERRIDES
 from gensig.errors import DatasetError, GensigError
-from gensig.implants.implant_sources import ImplantSources, read_sources, source_words
+from gensig.implants import implant_sources
+from gensig.implants.implant_sources import (
+    ImplantSources,
+    open_implanter,
+    read_sources,
+    source_words,
+)
 from gensig.implants.options import ImplantOptions
 
 
@@ -91,3 +99,20 @@ def test_other_words_are_one_line(tmp_path, word):
     assert "\n" not in str(raised.value)
     with refused("does not name the sources", DatasetError):
         read_sources(stored(out, words if name != "unknown" else words[1:]))
+
+
+def test_every_word_about_recordings_reaches_their_reader(tmp_path, monkeypatch):
+    given = {}
+
+    def taken(_, **words):
+        given.update(words)
+        raise DatasetError("read no further")
+
+    data = SimpleNamespace(close=lambda: None)
+    monkeypatch.setattr(implant_sources, "open_dataset", lambda _: data)
+    monkeypatch.setattr(implant_sources, "taken_recordings", taken)
+    whole = replace(sources(tmp_path), array="X097", unit="g", sampling_rate=51200.0)
+    with refused("read no further", DatasetError):
+        open_implanter(whole)
+    assert given == {name: getattr(whole, name) for name in given}
+    assert given.keys() == {"sampling_rate", "channels", "unit", "array", "tacho"}
