@@ -155,6 +155,7 @@ REFUSED = {
     # gears and faults
     "gensig generate fault=crack fault.crack_depth_mm=-1 out=x": "crack_depth_mm",
     "gensig stiffness fault=crack fault.crack_depth_mm=4.2": "root chord",
+    "gensig stiffness fault=crack fault.crack_depth_mm=3.6 fault.crack_width_mm=10": "checked",
     "gensig stiffness fault=crack fault.tooth=23": "0..22",
     "gensig stiffness fault=crack fault.pit_width_mm=3": "pit_width_mm",
     "gensig stiffness fault=pitting fault.pit_position_mm=9": "pit_position_mm",

@@ -8,6 +8,7 @@ from closeness import assert_close
 from fault_cases import GEARS, KINDS, on_path, one, side_of
 from refusals import given, refused
 
+from gensig import load_faults
 from gensig.errors import ConfigError, ExtrapolationError
 from gensig.faults.base import faulty_teeth
 from gensig.geometry.contact import corner_gap_by_pinion
@@ -194,3 +195,12 @@ def test_a_prescribed_phase_goes_with_the_papers_law(xiamen):
     with refused(text):
         replace(xiamen.mesh, phase="prescribed")
     assert replace(xiamen.mesh, law="paper", phase="prescribed").phase == "prescribed"
+
+
+def test_the_faulty_pair_of_the_curves_is_that_of_the_first_fault(xiamen):
+    crack = load_faults("fault=crack", "fault.tooth=5")
+    both = xiamen.stiffness_curves(
+        (*crack, *load_faults("fault=pitting", "fault.tooth=2"))
+    )
+    alone = xiamen.stiffness_curves(crack)
+    assert_close(both.faulty_pair_stiffness, alone.faulty_pair_stiffness)
