@@ -47,6 +47,12 @@ def test_every_record_has_the_same_bits(reference, reproduce):
     assert reproduce(reference) == (0, "6 of 6 records have the same bits\n")
 
 
+def test_whole_numbers_of_two_channels_have_the_same_bits(tmp_path, reproduce):
+    channels = "sensing.channels=[pinion_x,pinion_y]"
+    folder = make(tmp_path / "data", "dataset.sample_type=int16", channels)
+    assert reproduce(folder) == (0, "6 of 6 records have the same bits\n")
+
+
 @pytest.mark.parametrize(
     ("given", "n"), [("r000003", 1), ("r000005,r000001,1", 2), ("2e0", 2), ("99", 6)]
 )

@@ -11,6 +11,7 @@ from small_studies import command, task_on, train
 
 import diagnose.studies.benchmark
 import gensig.dataset.reader
+from diagnose.cli import main
 from diagnose.data.windows import subset_segments
 from diagnose.studies.benchmark import Benchmark, score_file, sha256, signal_rms
 
@@ -211,3 +212,15 @@ def test_frozen_benchmarks_are_whole():
         for methods in benchmark.results.values():
             for result in methods.values():
                 assert 0 <= result["low"] <= result["mean"] <= result["high"] <= 1
+
+
+def test_a_frozen_set_is_said_to_be_one(monkeypatch, capsys):
+    benchmark = {"name": "b", "differences": []}
+    of = "diagnose.studies.benchmark."
+    monkeypatch.setattr("gensig.dataset.reader.open_dataset", lambda _: None)
+    monkeypatch.setattr(f"{of}score_file", lambda *_, **__: {"benchmark": benchmark})
+    monkeypatch.setattr(f"{of}score_table", lambda _: ["scores"])
+    for said in ("plan, splits and signals are the frozen ones", "not comparable"):
+        assert main(["score", "--data", "set", "--predictions", "a.csv"]) == 0
+        assert said in "".join(capsys.readouterr())
+        benchmark["differences"].append("another plan")
