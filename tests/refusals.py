@@ -25,6 +25,6 @@ def refusals(table: Mapping[str, Any]) -> pytest.MarkDecorator:
 
 
 def given(words):
-    """What ``key=value`` words give, values as Python writes them."""
+    """Values of ``key=value`` words, as Python writes them."""
     pairs = (word.split("=") for word in words.split())
     return {key: literal_eval(value) for key, value in pairs}
